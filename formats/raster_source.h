@@ -1,0 +1,91 @@
+// One digital elevation model, read through GDAL: any format, any CRS.
+//
+// Guarantees: heights in metres (band scale, offset and unit applied); voids are NaN, whatever the
+// file calls them (declared void value, NaN, infinities, |h| > 1e30, mask band); pixel_at() is a
+// pure function of the point, so two tiles that ask for the same post get the same place.
+// A RasterSource is used by one thread at a time (GDAL < 3.10); open one for each thread.
+//
+// Pixel coordinates: (0, 0) is the outer corner of the first pixel, pixel (c, r) covers
+// [c, c+1) x [r, r+1), and its value stands at its centre (c + 0.5, r + 0.5). Files that say
+// "point" are shifted to this convention on opening.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "scheduler/tiling_scheme.h"
+
+namespace qmpipe {
+
+struct PixelPoint {
+  double column = 0;
+  double row = 0;
+};
+
+struct PixelWindow {
+  std::int64_t column0 = 0;
+  std::int64_t row0 = 0;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  std::size_t size() const { return static_cast<std::size_t>(width * height); }
+};
+
+struct RasterInfo {
+  std::string path;
+  std::string driver;
+  std::string crs_name;
+  bool is_geographic = false;
+  bool has_vertical_datum = false;  // the CRS is compound or 3D
+  std::string type_name;            // GDAL's name of the band's type, e.g. "Int16"
+  std::string unit;                 // as the band declares it, "m" when it is silent
+  double metres_per_unit = 1;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+  std::int64_t block_width = 0;
+  std::int64_t block_height = 0;
+  // Smallest extent of a pixel in degrees of longitude or latitude, measured at the centre of the
+  // raster and at its corners; decides the sampling zoom.
+  double pixel_deg = 0;
+  // The raster's extent. east_deg - west_deg <= 360; east_deg may exceed 180 when the raster
+  // crosses the antimeridian (then west_deg is in [-180, 180]).
+  RectangleDeg bounds_deg;
+  // True when the columns go once round the globe, so that the last pixel's eastern neighbour is
+  // the first.
+  bool wraps_columns = false;
+};
+
+class RasterSource {
+ public:
+  // `path` may be anything GDAL opens (a file, a .zip with one raster inside, /vsi..., a subdataset
+  // name). Throws IoError with the remedy: missing file, no driver, no CRS, no geotransform, rotated
+  // CRS that cannot be inverted, no band, complex type.
+  static std::unique_ptr<RasterSource> open(const std::string& path);
+  ~RasterSource();
+  RasterSource(const RasterSource&) = delete;
+  RasterSource& operator=(const RasterSource&) = delete;
+
+  const RasterInfo& info() const;
+
+  // Where a point of the globe (WGS84) lies on the raster, exactly transformed; may lie outside the
+  // raster. For rasters in degrees the longitude is moved by multiples of 360 into the raster's
+  // range where that is possible. None where the CRS does not reach the point.
+  std::optional<PixelPoint> pixel_at(double longitude_deg, double latitude_deg) const;
+
+  // Reads a window that lies inside the raster, row by row from the top, voids as NaN.
+  // REQUIRES: out.size() == window.size(). Throws IoError when the file cannot be read there.
+  void read(const PixelWindow& window, std::span<double> out) const;
+
+ private:
+  struct Impl;
+  explicit RasterSource(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+// Bounds GDAL's block cache for the whole process.
+void set_raster_cache_bytes(std::int64_t bytes);
+
+}  // namespace qmpipe

@@ -1,0 +1,38 @@
+#include "scheduler/lattice.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "scheduler/check.h"
+
+namespace qmpipe {
+
+Lattice::Lattice(TilingScheme scheme, std::int32_t zoom)
+    : scheme_(scheme),
+      zoom_(zoom),
+      columns_(scheme.columns(zoom) * kTileIntervals),
+      rows_(scheme.rows(zoom) * kTileIntervals + 1) {
+  QMPIPE_CHECK(zoom >= 0 && zoom <= kMaxZoom);
+}
+
+double Lattice::column_spacing_deg() const { return 360.0 / columns_; }
+
+// 360 / columns is 45 or 90 times a power of two over 64, hence exact, and so is its product with
+// any column: the same post has the same coordinates at every zoom.
+double Lattice::longitude_deg(std::int32_t i) const { return -180.0 + i * column_spacing_deg(); }
+
+double Lattice::latitude_deg(std::int32_t j) const {
+  if (scheme_.projection() == Projection::kGeodetic) return -90.0 + j * (180.0 / (rows_ - 1));
+  // The Mercator ordinate as a fraction of pi is exact; symmetric rows give opposite latitudes.
+  const double y = 2.0 * j / (rows_ - 1) - 1.0;
+  return std::atan(std::sinh(std::numbers::pi * y)) * (180.0 / std::numbers::pi);
+}
+
+PostWindow Lattice::tile_window(const TileKey& key, std::int32_t halo_posts) {
+  return {.i0 = key.x * kTileIntervals - halo_posts,
+          .j0 = key.y * kTileIntervals - halo_posts,
+          .width_posts = kTilePosts + 2 * halo_posts,
+          .height_posts = kTilePosts + 2 * halo_posts};
+}
+
+}  // namespace qmpipe

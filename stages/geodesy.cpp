@@ -1,0 +1,145 @@
+#include "stages/geodesy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "scheduler/check.h"
+
+namespace qmpipe {
+namespace {
+
+constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+// Far enough never to be hidden, near enough for the client's float arithmetic.
+constexpr double kNeverHidden = 1e6;
+
+struct SinCos {
+  double sin;
+  double cos;
+};
+
+// Exact where a pole or the antimeridian needs it: sin and cos of multiples of 90 degrees.
+SinCos sin_cos_deg(double angle_deg) {
+  const double quarter = angle_deg / 90.0;
+  if (quarter == std::floor(quarter)) {
+    switch ((static_cast<int>(quarter) % 4 + 4) % 4) {
+      case 0:
+        return {0, 1};
+      case 1:
+        return {1, 0};
+      case 2:
+        return {0, -1};
+      default:
+        return {-1, 0};
+    }
+  }
+  return {std::sin(angle_deg * kRadPerDeg), std::cos(angle_deg * kRadPerDeg)};
+}
+
+Sphere ritter_sphere(std::span<const Vec3> points) {
+  const auto farthest = [&points](const Vec3& from) {
+    return *std::max_element(points.begin(), points.end(), [&from](const Vec3& a, const Vec3& b) {
+      return length(minus(a, from)) < length(minus(b, from));
+    });
+  };
+  const Vec3 a = farthest(points.front());
+  const Vec3 b = farthest(a);
+  Sphere sphere{.centre = scaled(plus(a, b), 0.5), .radius_m = length(minus(a, b)) / 2};
+  for (const Vec3& p : points) {
+    const double d = length(minus(p, sphere.centre));
+    if (d <= sphere.radius_m) continue;
+    const double radius = (sphere.radius_m + d) / 2;
+    sphere.centre = plus(sphere.centre, scaled(minus(p, sphere.centre), (d - radius) / d));
+    sphere.radius_m = radius;
+  }
+  return sphere;
+}
+
+Sphere box_sphere(std::span<const Vec3> points) {
+  Vec3 low = points.front();
+  Vec3 high = points.front();
+  for (const Vec3& p : points) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], p[k]);
+      high[k] = std::max(high[k], p[k]);
+    }
+  }
+  return {.centre = scaled(plus(low, high), 0.5), .radius_m = 0};
+}
+
+}  // namespace
+
+Vec3 plus(const Vec3& a, const Vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Vec3 scaled(const Vec3& a, double factor) {
+  return {a[0] * factor, a[1] * factor, a[2] * factor};
+}
+Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double length(const Vec3& a) { return std::sqrt(dot(a, a)); }
+Vec3 unit(const Vec3& a) {
+  const double n = length(a);
+  QMPIPE_ASSERT(n > 0);
+  return scaled(a, 1 / n);
+}
+
+Vec3 up_at(double longitude_deg, double latitude_deg) {
+  const SinCos lon = sin_cos_deg(longitude_deg);
+  const SinCos lat = sin_cos_deg(latitude_deg);
+  return {lat.cos * lon.cos, lat.cos * lon.sin, lat.sin};
+}
+
+Vec3 to_ecef(const GeoPoint& point) {
+  const Vec3 up = up_at(point.longitude_deg, point.latitude_deg);
+  constexpr double kA2 = kEquatorialRadiusM * kEquatorialRadiusM;
+  constexpr double kB2 = kPolarRadiusM * kPolarRadiusM;
+  // The point of the ellipsoid whose normal is `up`: (a2 x, a2 y, b2 z) / |(a x, a y, b z)|.
+  const double gamma = std::sqrt(kA2 * (up[0] * up[0] + up[1] * up[1]) + kB2 * up[2] * up[2]);
+  return {(kA2 / gamma + point.height_m) * up[0], (kA2 / gamma + point.height_m) * up[1],
+          (kB2 / gamma + point.height_m) * up[2]};
+}
+
+Sphere bounding_sphere(std::span<const Vec3> points_ecef) {
+  QMPIPE_CHECK(!points_ecef.empty());
+  Sphere best = ritter_sphere(points_ecef);
+  Sphere box = box_sphere(points_ecef);
+  for (Sphere* sphere : {&best, &box}) {
+    // Measured again from the final centre, so that no rounding leaves a point outside.
+    double radius = 0;
+    for (const Vec3& p : points_ecef) radius = std::max(radius, length(minus(p, sphere->centre)));
+    sphere->radius_m = radius * (1 + 1e-12);
+  }
+  return box.radius_m < best.radius_m ? box : best;
+}
+
+double occlusion_magnitude(const Vec3& unit_direction_scaled, const Vec3& point_ecef) {
+  const Vec3 p = {point_ecef[0] / kEquatorialRadiusM, point_ecef[1] / kEquatorialRadiusM,
+                  point_ecef[2] / kPolarRadiusM};
+  // Points below the ellipsoid count as on it, as in the clients.
+  const double magnitude_squared = std::max(1.0, dot(p, p));
+  const double magnitude = std::sqrt(magnitude_squared);
+  const Vec3 direction = unit(p);
+  const double cos_alpha = dot(direction, unit_direction_scaled);
+  const double sin_alpha = length(cross(direction, unit_direction_scaled));
+  const double cos_beta = 1 / magnitude;
+  const double sin_beta = std::sqrt(magnitude_squared - 1) * cos_beta;
+  const double denominator = cos_alpha * cos_beta - sin_alpha * sin_beta;
+  if (denominator <= 0) return std::numeric_limits<double>::infinity();
+  return 1 / denominator;
+}
+
+Vec3 horizon_occlusion_point(const Vec3& direction_ecef, std::span<const Vec3> points_ecef) {
+  const Vec3 direction = unit({direction_ecef[0] / kEquatorialRadiusM,
+                               direction_ecef[1] / kEquatorialRadiusM,
+                               direction_ecef[2] / kPolarRadiusM});
+  double magnitude = 0;
+  for (const Vec3& p : points_ecef) {
+    magnitude = std::max(magnitude, occlusion_magnitude(direction, p));
+  }
+  return scaled(direction, std::min(magnitude, kNeverHidden));
+}
+
+}  // namespace qmpipe

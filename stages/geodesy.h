@@ -1,0 +1,54 @@
+// WGS84 arithmetic: ECEF positions, normals, bounding spheres, horizon occlusion points.
+//
+// Sources: quantized-mesh SPECIFICATION (header fields); horizon occlusion after K. Ring,
+// "Computing the horizon occlusion point" (Cesium, 2013). Angles in degrees in, metres out.
+#pragma once
+
+#include <span>
+
+#include "formats/quantized_mesh.h"
+
+namespace qmpipe {
+
+inline constexpr double kEquatorialRadiusM = 6378137.0;
+inline constexpr double kPolarRadiusM = 6356752.3142451793;
+
+struct GeoPoint {
+  double longitude_deg = 0;
+  double latitude_deg = 0;
+  double height_m = 0;  // ellipsoidal
+};
+
+Vec3 to_ecef(const GeoPoint& point);
+// Unit vector that points straight up from the ellipsoid.
+Vec3 up_at(double longitude_deg, double latitude_deg);
+
+Vec3 plus(const Vec3& a, const Vec3& b);
+Vec3 minus(const Vec3& a, const Vec3& b);
+Vec3 scaled(const Vec3& a, double factor);
+Vec3 cross(const Vec3& a, const Vec3& b);
+double dot(const Vec3& a, const Vec3& b);
+double length(const Vec3& a);
+// REQUIRES: a is not zero.
+Vec3 unit(const Vec3& a);
+
+struct Sphere {
+  Vec3 centre{};
+  double radius_m = 0;
+};
+
+// A sphere that holds every point (at most about 5 % larger than the smallest one: Ritter's, then
+// improved). REQUIRES: at least one point.
+Sphere bounding_sphere(std::span<const Vec3> points_ecef);
+
+// The point, in units of the ellipsoid's radii, on the ray from the earth's centre through
+// `direction_ecef` (usually the bounding sphere's centre) that is hidden by the ellipsoid only when
+// all the given points are. Where no finite point exists (a tile that spans half the globe), the
+// ray's point at a distance of 1e6 radii: it is never hidden, which is always safe.
+Vec3 horizon_occlusion_point(const Vec3& direction_ecef, std::span<const Vec3> points_ecef);
+
+// How far along its ray a single point pushes the occlusion point; infinity where it cannot be
+// hidden along this ray. The occlusion point's distance is the largest over all points.
+double occlusion_magnitude(const Vec3& unit_direction_scaled, const Vec3& point_ecef);
+
+}  // namespace qmpipe

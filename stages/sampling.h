@@ -1,0 +1,45 @@
+// Heights at posts, read from rasters: the first step of a run.
+//
+// Guarantees: a post's height is a pure function of the post, the sources and the resampling (DESIGN
+// 5.1): it does not depend on the window it was asked in, on the thread or on what was asked before.
+// Sources are taken in the order given: the first that is valid at a post wins. Voids are NaN.
+// A post lies on a raster when it lies within the outer edges of its pixels; it is void where the
+// pixel that contains it is void. Interpolation uses the valid neighbours only.
+// A Sampler is used by one thread at a time.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/raster_source.h"
+#include "scheduler/lattice.h"
+
+namespace qmpipe {
+
+enum class Resampling { kBilinear, kCubic, kNearest };
+
+class Sampler {
+ public:
+  // REQUIRES: at least one source.
+  Sampler(std::vector<std::unique_ptr<RasterSource>> sources, Resampling resampling);
+  ~Sampler();
+  Sampler(Sampler&&) noexcept;
+
+  // The height of every post of the window, in metres, row by row from the south. Columns wrap;
+  // rows outside the lattice are void. REQUIRES: out.size() == window.size(). Throws IoError.
+  void sample(const Lattice& lattice, const PostWindow& window, std::span<float> out);
+
+  // True when some source's extent touches the window; false means all void without any reading.
+  bool may_cover(const Lattice& lattice, const PostWindow& window) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// The coarsest zoom whose post spacing is no larger than the finest source pixel.
+std::int32_t sampling_zoom_for(const TilingScheme& scheme, std::span<const RasterInfo> sources);
+
+}  // namespace qmpipe
