@@ -1,19 +1,27 @@
 #include "scheduler/lattice.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "scheduler/check.h"
 
 namespace qmpipe {
+namespace {
+
+// Before anything is shifted by it.
+std::int32_t checked_zoom(std::int32_t zoom) {
+  QMPIPE_CHECK(zoom >= 0 && zoom <= kMaxZoom);
+  return zoom;
+}
+
+}  // namespace
 
 Lattice::Lattice(TilingScheme scheme, std::int32_t zoom)
     : scheme_(scheme),
-      zoom_(zoom),
+      zoom_(checked_zoom(zoom)),
       columns_(scheme.columns(zoom) * kTileIntervals),
-      rows_(scheme.rows(zoom) * kTileIntervals + 1) {
-  QMPIPE_CHECK(zoom >= 0 && zoom <= kMaxZoom);
-}
+      rows_(scheme.rows(zoom) * kTileIntervals + 1) {}
 
 double Lattice::column_spacing_deg() const { return 360.0 / columns_; }
 
@@ -26,6 +34,20 @@ double Lattice::latitude_deg(std::int32_t j) const {
   // The Mercator ordinate as a fraction of pi is exact; symmetric rows give opposite latitudes.
   const double y = 2.0 * j / (rows_ - 1) - 1.0;
   return std::atan(std::sinh(std::numbers::pi * y)) * (180.0 / std::numbers::pi);
+}
+
+double Lattice::column_at(double longitude_deg) const {
+  return (longitude_deg + 180.0) / column_spacing_deg();
+}
+
+double Lattice::row_at(double latitude_deg) const {
+  if (scheme_.projection() == Projection::kGeodetic) {
+    return (latitude_deg + 90.0) / 180.0 * (rows_ - 1);
+  }
+  const double clamped_deg =
+      std::clamp(latitude_deg, this->latitude_deg(0), this->latitude_deg(rows_ - 1));
+  const double y = std::asinh(std::tan(clamped_deg * (std::numbers::pi / 180.0)));
+  return (y / std::numbers::pi + 1.0) / 2.0 * (rows_ - 1);
 }
 
 PostWindow Lattice::tile_window(const TileKey& key, std::int32_t halo_posts) {

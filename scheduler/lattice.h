@@ -58,6 +58,10 @@ class Lattice {
   // Longitude of column i; not wrapped: column columns() is +180.
   double longitude_deg(std::int32_t i) const;
   double latitude_deg(std::int32_t j) const;
+  // The inverses, in posts, not rounded and not clamped (row_at() in the mercator scheme takes
+  // latitudes beyond +-85.06 degrees as that limit).
+  double column_at(double longitude_deg) const;
+  double row_at(double latitude_deg) const;
   // Distance between columns; in the geodetic scheme also between rows.
   double column_spacing_deg() const;
 

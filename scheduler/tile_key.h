@@ -24,8 +24,8 @@ struct TileKey {
   }
 };
 
-// The deepest zoom whose lattice indices fit 32 bits in both schemes.
-inline constexpr std::int32_t kMaxZoom = 22;
+// The deepest zoom whose lattice indices, with a halo around them, fit 32 bits in both schemes.
+inline constexpr std::int32_t kMaxZoom = 21;
 
 // REQUIRES: key.zoom > 0.
 constexpr TileKey parent_of(const TileKey& key) {

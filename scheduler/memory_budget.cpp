@@ -1,0 +1,53 @@
+#include "scheduler/memory_budget.h"
+
+#include <algorithm>
+
+#include "scheduler/check.h"
+
+namespace qmpipe {
+namespace {
+
+constexpr std::int64_t kPlanBytesPerTile = 160;
+constexpr std::int64_t kSmallestCacheBytes = 16LL << 20U;
+constexpr std::int64_t kComfortableCacheBytes = 64LL << 20U;
+
+// Enough that every thread has work while the sink waits for the slowest tile of a chain.
+constexpr std::int32_t comfortable_in_flight(std::int32_t threads) {
+  return std::max(8, 4 * threads);
+}
+
+}  // namespace
+
+MemoryPlan plan_memory(std::int64_t limit_bytes, const MemoryNeeds& needs) {
+  QMPIPE_CHECK(needs.threads >= 1 && limit_bytes >= 0);
+  const std::int64_t fixed =
+      kProgramBytes + needs.lattice_bytes + needs.tiles * kPlanBytesPerTile;
+  const std::int64_t smallest_cache = std::max(kSmallestCacheBytes, 4 * needs.source_block_bytes);
+
+  MemoryPlan plan;
+  plan.smallest_limit_bytes =
+      fixed + smallest_cache + std::max(kSamplingBytesPerThread, kTileInFlightBytes);
+  plan.fits = limit_bytes == 0 || limit_bytes >= plan.smallest_limit_bytes;
+  plan.raster_cache_bytes = std::max(kComfortableCacheBytes, smallest_cache);
+  plan.sampling_threads = needs.threads;
+  plan.max_in_flight = comfortable_in_flight(needs.threads);
+  // Sampling and meshing follow each other, so each may use what the other has given back.
+  const auto working_bytes = [&plan] {
+    return std::max(plan.sampling_threads * kSamplingBytesPerThread,
+                    plan.max_in_flight * kTileInFlightBytes);
+  };
+  if (limit_bytes > 0) {
+    // First the cache down to its least, then the tiles and samplers.
+    plan.raster_cache_bytes = std::clamp(limit_bytes - fixed - working_bytes(), smallest_cache,
+                                         plan.raster_cache_bytes);
+    const std::int64_t left = limit_bytes - fixed - plan.raster_cache_bytes;
+    plan.max_in_flight = static_cast<std::int32_t>(
+        std::clamp<std::int64_t>(left / kTileInFlightBytes, 1, plan.max_in_flight));
+    plan.sampling_threads = static_cast<std::int32_t>(
+        std::clamp<std::int64_t>(left / kSamplingBytesPerThread, 1, plan.sampling_threads));
+  }
+  plan.expected_peak_bytes = fixed + plan.raster_cache_bytes + working_bytes();
+  return plan;
+}
+
+}  // namespace qmpipe
