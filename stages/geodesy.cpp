@@ -132,6 +132,8 @@ double occlusion_magnitude(const Vec3& unit_direction_scaled, const Vec3& point_
 }
 
 Vec3 horizon_occlusion_point(const Vec3& direction_ecef, std::span<const Vec3> points_ecef) {
+  // The sphere of a root tile may stand at the earth's centre, from where no ray is the right one.
+  if (length(direction_ecef) == 0) return {kNeverHidden, 0, 0};
   const Vec3 direction = unit({direction_ecef[0] / kEquatorialRadiusM,
                                direction_ecef[1] / kEquatorialRadiusM,
                                direction_ecef[2] / kPolarRadiusM});

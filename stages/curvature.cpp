@@ -1,0 +1,46 @@
+#include "stages/curvature.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "stages/geodesy.h"
+
+namespace qmpipe {
+namespace {
+constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+
+double cos_squared_deg(double latitude_deg) {
+  const double c = std::abs(latitude_deg) == 90 ? 0 : std::cos(latitude_deg * kRadPerDeg);
+  return c * c;
+}
+}  // namespace
+
+CurvatureTerms curvature_terms(const TileGrid& grid) {
+  CurvatureTerms terms;
+  terms.metres_per_unit = -kEquatorialRadiusM / 2;
+  terms.width_rad = (grid.longitude_deg.back() - grid.longitude_deg.front()) * kRadPerDeg;
+  terms.height_rad = (grid.latitude_deg.back() - grid.latitude_deg.front()) * kRadPerDeg;
+  const double middle_lon_deg = (grid.longitude_deg.front() + grid.longitude_deg.back()) / 2;
+  const double middle_lat_deg = (grid.latitude_deg.front() + grid.latitude_deg.back()) / 2;
+  for (std::size_t k = 0; k < terms.longitude_squared.size(); ++k) {
+    const double dl = (grid.longitude_deg[k] - middle_lon_deg) * kRadPerDeg;
+    const double df = (grid.latitude_deg[k] - middle_lat_deg) * kRadPerDeg;
+    terms.longitude_squared[k] = dl * dl;
+    terms.latitude_squared[k] = df * df;
+    terms.parallel_scale[k] = cos_squared_deg(grid.latitude_deg[k]);
+  }
+  return terms;
+}
+
+double largest_sagitta_m(const TileGrid& grid) {
+  const double width_rad = (grid.longitude_deg.back() - grid.longitude_deg.front()) * kRadPerDeg;
+  const double height_rad = (grid.latitude_deg.back() - grid.latitude_deg.front()) * kRadPerDeg;
+  const bool spans_equator = grid.latitude_deg.front() <= 0 && grid.latitude_deg.back() >= 0;
+  const double scale = spans_equator ? 1.0
+                                     : std::max(cos_squared_deg(grid.latitude_deg.front()),
+                                                cos_squared_deg(grid.latitude_deg.back()));
+  return kEquatorialRadiusM / 8 * (height_rad * height_rad + scale * width_rad * width_rad);
+}
+
+}  // namespace qmpipe

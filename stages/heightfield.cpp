@@ -1,0 +1,95 @@
+#include "stages/heightfield.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace qmpipe {
+namespace {
+
+// Rounds down for negative columns too, which a halo west of column 0 has.
+constexpr std::int32_t half_down(std::int32_t k) { return k >> 1; }
+constexpr std::int32_t half_up(std::int32_t k) { return (k + 1) >> 1; }
+
+// The posts of the coarser zoom between which the window's posts lie.
+PostWindow coarser_window(const PostWindow& window) {
+  const std::int32_t i0 = half_down(window.i0);
+  const std::int32_t j0 = half_down(window.j0);
+  return {.i0 = i0,
+          .j0 = j0,
+          .width_posts = half_up(window.i0 + window.width_posts - 1) - i0 + 1,
+          .height_posts = half_up(window.j0 + window.height_posts - 1) - j0 + 1};
+}
+
+std::size_t position(const PostWindow& window, std::int32_t i, std::int32_t j) {
+  return static_cast<std::size_t>(j - window.j0) * static_cast<std::size_t>(window.width_posts) +
+         static_cast<std::size_t>(i - window.i0);
+}
+
+bool any_void(const std::vector<float>& heights_m) {
+  return std::any_of(heights_m.begin(), heights_m.end(), [](float h) { return std::isnan(h); });
+}
+
+}  // namespace
+
+Heightfield::Heightfield(const LatticeStore& store, TilingScheme scheme, VoidPolicy policy,
+                         std::vector<PoleHeights> pole_heights)
+    : store_(store), scheme_(scheme), policy_(policy), pole_heights_(std::move(pole_heights)) {}
+
+WindowHeights Heightfield::window(std::int32_t zoom, const PostWindow& window) const {
+  const Lattice lattice(scheme_, zoom);
+  WindowHeights result;
+  result.window = window;
+  result.heights_m.resize(window.size());
+  result.valid.resize(window.size());
+  store_.read(lattice, window, result.heights_m);
+  for (std::size_t k = 0; k < result.valid.size(); ++k) {
+    result.valid[k] = std::isnan(result.heights_m[k]) ? 0 : 1;
+  }
+  const std::int32_t levels =
+      policy_.kind == VoidPolicy::Kind::kPull ? std::min(policy_.pull_levels, zoom) : 0;
+  fill(lattice, window, levels, result.heights_m);
+  return result;
+}
+
+void Heightfield::fill(const Lattice& lattice, const PostWindow& window, std::int32_t levels,
+                       std::vector<float>& heights_m) const {
+  if (!any_void(heights_m)) return;
+  fill_pole_rows(lattice, window, heights_m);
+  const auto base_m = static_cast<float>(policy_.base_height_m);
+  if (levels == 0) {
+    std::replace_if(heights_m.begin(), heights_m.end(), [](float h) { return std::isnan(h); },
+                    base_m);
+    return;
+  }
+  const Lattice coarser(scheme_, lattice.zoom() - 1);
+  const PostWindow around = coarser_window(window);
+  std::vector<float> pulled_m(around.size());
+  store_.read(coarser, around, pulled_m);
+  fill(coarser, around, levels - 1, pulled_m);
+  for (std::int32_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
+    for (std::int32_t i = window.i0; i < window.i0 + window.width_posts; ++i) {
+      float& height_m = heights_m[position(window, i, j)];
+      if (!std::isnan(height_m)) continue;
+      const float south_west = pulled_m[position(around, half_down(i), half_down(j))];
+      const float south_east = pulled_m[position(around, half_up(i), half_down(j))];
+      const float north_west = pulled_m[position(around, half_down(i), half_up(j))];
+      const float north_east = pulled_m[position(around, half_up(i), half_up(j))];
+      height_m = ((south_west + south_east) + (north_west + north_east)) * 0.25F;
+    }
+  }
+}
+
+void Heightfield::fill_pole_rows(const Lattice& lattice, const PostWindow& window,
+                                 std::vector<float>& heights_m) const {
+  for (const std::int32_t j : {0, lattice.rows() - 1}) {
+    if (!lattice.is_pole_row(j) || j < window.j0 || j >= window.j0 + window.height_posts) continue;
+    const auto& pole = pole_heights_.at(static_cast<std::size_t>(lattice.zoom()))[j == 0 ? 0 : 1];
+    const auto row = heights_m.begin() +
+                     static_cast<std::ptrdiff_t>(position(window, window.i0, j));
+    // Without data at the pole the whole row takes the base height: it is one point of the globe.
+    std::fill(row, row + window.width_posts,
+              pole.value_or(static_cast<float>(policy_.base_height_m)));
+  }
+}
+
+}  // namespace qmpipe

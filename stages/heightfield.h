@@ -1,0 +1,70 @@
+// The posts of a window in metres, without voids: what the mesh of a tile is made from.
+//
+// Guarantees: a post's height is a pure function of the post, the lattice store and the void
+// policy, so two windows agree on every post they share, whatever each sees around it. Posts of a
+// pole row have one height.
+// const use is safe from several threads.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "formats/lattice_store.h"
+#include "scheduler/lattice.h"
+
+namespace qmpipe {
+
+struct VoidPolicy {
+  enum class Kind {
+    // The height of the coarser zooms' valid posts, fading to base_height_m some 64 posts from the
+    // data: no cliffs, no sunken globe. DEFAULT.
+    kPull,
+    // base_height_m at once.
+    kHeight,
+  };
+  Kind kind = Kind::kPull;
+  double base_height_m = 0;
+  // How many zooms `pull` looks up; the fade ends after 2^levels posts. DEFAULT: 6.
+  std::int32_t pull_levels = 6;
+  friend bool operator==(const VoidPolicy&, const VoidPolicy&) = default;
+};
+
+// The one height of each pole row of a zoom, where the data reach it: south, north.
+using PoleHeights = std::array<std::optional<float>, 2>;
+
+struct WindowHeights {
+  PostWindow window;
+  std::vector<float> heights_m;      // all finite
+  std::vector<std::uint8_t> valid;   // 1 where the post is no void
+  std::size_t index(std::int32_t i, std::int32_t j) const {
+    return static_cast<std::size_t>(j - window.j0) *
+               static_cast<std::size_t>(window.width_posts) +
+           static_cast<std::size_t>(i - window.i0);
+  }
+  float height_m(std::int32_t i, std::int32_t j) const { return heights_m[index(i, j)]; }
+};
+
+class Heightfield {
+ public:
+  // REQUIRES: `store` outlives this; pole_heights[zoom] for every zoom that is read (may be empty
+  // in the mercator scheme).
+  Heightfield(const LatticeStore& store, TilingScheme scheme, VoidPolicy policy,
+              std::vector<PoleHeights> pole_heights);
+
+  WindowHeights window(std::int32_t zoom, const PostWindow& window) const;
+  const TilingScheme& scheme() const { return scheme_; }
+
+ private:
+  void fill(const Lattice& lattice, const PostWindow& window, std::int32_t levels,
+            std::vector<float>& heights_m) const;
+  void fill_pole_rows(const Lattice& lattice, const PostWindow& window,
+                      std::vector<float>& heights_m) const;
+
+  const LatticeStore& store_;
+  TilingScheme scheme_;
+  VoidPolicy policy_;
+  std::vector<PoleHeights> pole_heights_;
+};
+
+}  // namespace qmpipe

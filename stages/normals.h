@@ -1,0 +1,24 @@
+// Vertex normals from the lattice, not from a tile's own triangles: both tiles at a border see the
+// same posts and so write the same two bytes, which leaves no seam in the light (FORMATS 2.4).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "formats/quantized_mesh.h"
+#include "stages/heightfield.h"
+#include "stages/tin.h"
+
+namespace qmpipe {
+
+// The unit normal in ECEF of the surface through the post's four neighbours; on a pole row, which
+// has none beyond it, straight up. A pure function of the post and its neighbours' heights.
+// REQUIRES: the window holds the post's neighbours as far as the lattice has them.
+Vec3 lattice_normal(const Lattice& lattice, const WindowHeights& heights, const Post& post);
+
+// One for each of the tile's posts given by tile_post_index. REQUIRES: a halo of one post.
+std::vector<OctNormal> tile_normals(const TilingScheme& scheme, const TileKey& key,
+                                    const WindowHeights& heights,
+                                    std::span<const std::int32_t> posts);
+
+}  // namespace qmpipe

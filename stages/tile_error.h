@@ -1,0 +1,31 @@
+// The vertical error of a decoded tile against its zoom's posts: the measure of DESIGN 4.3.
+//
+// A post that is a vertex is judged where the file puts the vertex (half a quantized unit from its
+// exact place at most); every other post at its exact place on the surface.
+#pragma once
+
+#include <span>
+
+#include "formats/quantized_mesh.h"
+#include "stages/tin.h"
+
+namespace qmpipe {
+
+struct ErrorSummary {
+  std::int64_t posts = 0;  // valid posts judged
+  double largest_m = 0;
+  double sum_m = 0;             // of magnitudes
+  double sum_of_squares_m2 = 0;
+  Post worst;              // of the tile, where largest_m was found first (lowest index)
+
+  void add(const ErrorSummary& other);
+  double mean_m() const;
+  double rms_m() const;
+};
+
+// REQUIRES: a mesh that decoded; heights_m and valid of kTilePostCount. Posts that no triangle
+// covers (a damaged tile of another program) are not counted.
+ErrorSummary measure_error(const TileGrid& grid, const QuantizedMesh& mesh,
+                           std::span<const float> heights_m, std::span<const std::uint8_t> valid);
+
+}  // namespace qmpipe
