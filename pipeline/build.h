@@ -1,0 +1,23 @@
+// A whole build: survey, plan, estimate, mesh pass, layer.json, report.json.
+//
+// Guarantees: the tiles and layer.json depend on the inputs and the recipe alone, not on threads or
+// memory. layer.json is written last: a folder without it is no finished tile set.
+// Throws UsageError (options), IoError (files), Interrupted (asked to stop), InternalError (a bug).
+#pragma once
+
+#include "pipeline/build_options.h"
+#include "pipeline/estimate.h"
+#include "pipeline/progress.h"
+#include "pipeline/report.h"
+
+namespace qmpipe {
+
+struct BuildResult {
+  Estimate estimate;
+  // Empty after a dry run.
+  BuildReport report;
+};
+
+BuildResult build_pyramid(const BuildOptions& options, Progress& progress);
+
+}  // namespace qmpipe

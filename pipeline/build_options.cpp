@@ -1,0 +1,62 @@
+#include "pipeline/build_options.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace qmpipe {
+namespace {
+
+// Below this the heights of float32 lattices and headers are coarser than the tolerance.
+constexpr double kSmallestToleranceM = 0.001;
+constexpr double kLargestToleranceM = 1e7;
+constexpr std::int32_t kMostThreads = 1024;
+
+bool is_tolerance(double tolerance_m) {
+  return std::isfinite(tolerance_m) && tolerance_m >= kSmallestToleranceM &&
+         tolerance_m <= kLargestToleranceM;
+}
+
+}  // namespace
+
+std::vector<std::string> violated_rules(const BuildOptions& options) {
+  std::vector<std::string> rules;
+  const auto require = [&rules](bool holds, std::string rule) {
+    if (!holds) rules.push_back(std::move(rule));
+  };
+  const MeshOptions& mesh = options.mesh;
+  require(!options.input.paths.empty(), "INPUT: name at least one raster");
+  require(options.run.dry_run || !options.output.path.empty(),
+          "-o, --output: name the folder for the tiles");
+  require(mesh.min_zoom >= 0 && mesh.min_zoom <= kMaxZoom,
+          fmt::format("--min-zoom must be 0..{}", kMaxZoom));
+  require(!mesh.max_zoom || (*mesh.max_zoom >= 0 && *mesh.max_zoom <= kMaxZoom),
+          fmt::format("--max-zoom must be 0..{}", kMaxZoom));
+  require(!mesh.max_zoom || *mesh.max_zoom >= mesh.min_zoom,
+          "--max-zoom must not be less than --min-zoom");
+  require(is_tolerance(mesh.root_tolerance_m),
+          fmt::format("--tolerance must be {}..{} metres", kSmallestToleranceM,
+                      kLargestToleranceM));
+  for (const auto& [zoom, tolerance_m] : mesh.tolerance_at_m) {
+    require(zoom >= 0 && zoom <= kMaxZoom && is_tolerance(tolerance_m),
+            fmt::format("--tolerance-at {}={}: the zoom must be 0..{}, the tolerance {}..{} metres",
+                        zoom, tolerance_m, kMaxZoom, kSmallestToleranceM, kLargestToleranceM));
+  }
+  require(mesh.initial_grid_cells >= 0 && mesh.initial_grid_cells <= kTileIntervals,
+          fmt::format("--grid must be 0..{} cells", kTileIntervals));
+  require(!options.encode.gzip_level ||
+              (*options.encode.gzip_level >= 1 && *options.encode.gzip_level <= 12),
+          "--gzip must be 1..12 or none");
+  require(options.run.threads >= 1 && options.run.threads <= kMostThreads,
+          fmt::format("--threads must be 1..{}", kMostThreads));
+  require(options.run.memory_bytes >= 0, "--memory must not be negative");
+  return rules;
+}
+
+double tolerance_at(const MeshOptions& options, std::int32_t zoom) {
+  const auto own = options.tolerance_at_m.find(zoom);
+  return own != options.tolerance_at_m.end() ? own->second
+                                             : std::ldexp(options.root_tolerance_m, -zoom);
+}
+
+}  // namespace qmpipe

@@ -1,0 +1,83 @@
+// What a person may choose about a build. Defaults stand here and nowhere else.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/folder_sink.h"
+#include "pipeline/recipe.h"
+
+namespace qmpipe {
+
+struct InputOptions {
+  // In order of priority: the first source that is valid at a post wins.
+  std::vector<std::string> paths;
+  // Overrides the CRS of all inputs; anything GDAL understands. DEFAULT: the inputs' own.
+  std::string source_crs;
+  // DEFAULT: bilinear.
+  Resampling resampling = Resampling::kBilinear;
+};
+
+struct MeshOptions {
+  // DEFAULT: geodetic.
+  Projection projection = Projection::kGeodetic;
+  // DEFAULT: 0. Above 0 the set has no roots, which few clients can use.
+  std::int32_t min_zoom = 0;
+  // DEFAULT: the sampling zoom, that is the coarsest whose posts are no wider apart than the pixels.
+  std::optional<std::int32_t> max_zoom;
+  Method method = Method::kGreedy;
+  // Metres at zoom 0, halved at each deeper one. DEFAULT: 15000, as in Campos et al. 2020, Table 3.
+  double root_tolerance_m = 15000;
+  // Zooms with a tolerance of their own.
+  std::map<std::int32_t, double> tolerance_at_m;
+  // Cells a side of the regular grid that greedy insertion starts with. DEFAULT: 0, because the
+  // curvature of the globe is part of the error and puts vertices where they are needed.
+  std::int32_t initial_grid_cells = 0;
+  // DEFAULT: mean.
+  Reduction reduction = Reduction::kMean;
+  // DEFAULT: pull.
+  VoidPolicy voids;
+};
+
+struct EncodeOptions {
+  // 1..12, none for plain tiles. DEFAULT: 9.
+  std::optional<int> gzip_level = 9;
+  // DEFAULT: yes.
+  bool normals = true;
+};
+
+struct RunOptions {
+  // DEFAULT: as many as the machine has cores.
+  std::int32_t threads = 1;
+  // For the whole process; 0: no limit beyond what the work needs. DEFAULT: 0.
+  std::int64_t memory_bytes = 0;
+  bool dry_run = false;
+};
+
+struct OutputOptions {
+  std::filesystem::path path;
+  Overwrite overwrite = Overwrite::kNo;
+  std::string name;
+  std::string description;
+  std::string attribution;
+};
+
+struct BuildOptions {
+  InputOptions input;
+  MeshOptions mesh;
+  EncodeOptions encode;
+  RunOptions run;
+  OutputOptions output;
+};
+
+// Every rule that the options break, each a sentence that names the option; empty when all is well.
+std::vector<std::string> violated_rules(const BuildOptions& options);
+
+// The tolerance g(z) in metres.
+double tolerance_at(const MeshOptions& options, std::int32_t zoom);
+
+}  // namespace qmpipe

@@ -1,0 +1,42 @@
+// What a build will cost, said before it starts: tiles are counted, bytes and time are measured on a
+// sample of tiles, memory comes from the plan.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "pipeline/build_plan.h"
+#include "scheduler/memory_budget.h"
+#include "stages/heightfield.h"
+
+namespace qmpipe {
+
+struct ZoomEstimate {
+  std::int32_t zoom = 0;
+  std::int64_t tiles = 0;
+  std::int64_t bytes = 0;
+  double seconds = 0;  // of one core
+};
+
+struct Estimate {
+  std::vector<ZoomEstimate> zooms;
+  std::int64_t tiles = 0;
+  std::int64_t bytes = 0;
+  double seconds = 0;  // of wall time, on the given number of threads that have a core
+  std::int64_t expected_peak_bytes = 0;
+  std::int32_t sampling_zoom = 0;
+};
+
+// Meshes up to `sample_tiles` tiles of each zoom, evenly spaced, without their neighbours' borders.
+Estimate estimate_build(const BuildOptions& options, const BuildPlan& plan,
+                        const Heightfield& heightfield, const MemoryPlan& memory,
+                        std::int32_t sample_tiles);
+
+std::string estimate_text(const Estimate& estimate);
+std::string estimate_json(const Estimate& estimate);  // one line
+
+// "1.2 MB", powers of ten, as disks are sold.
+std::string bytes_text(std::int64_t bytes);
+
+}  // namespace qmpipe

@@ -1,0 +1,188 @@
+#include "pipeline/recipe.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace qmpipe {
+namespace {
+
+using nlohmann::json;
+
+template <class Value>
+struct Named {
+  Value value;
+  const char* name;
+};
+
+constexpr Named<Resampling> kResamplings[] = {{Resampling::kBilinear, "bilinear"},
+                                              {Resampling::kCubic, "cubic"},
+                                              {Resampling::kNearest, "nearest"}};
+constexpr Named<Reduction> kReductions[] = {{Reduction::kMean, "mean"},
+                                            {Reduction::kSubsample, "subsample"},
+                                            {Reduction::kMax, "max"},
+                                            {Reduction::kMin, "min"}};
+constexpr Named<Method> kMethods[] = {{Method::kGreedy, "greedy"}};
+
+template <class Value, std::size_t kCount>
+std::string name_in(const Named<Value> (&table)[kCount], Value value) {
+  for (const auto& entry : table) {
+    if (entry.value == value) return entry.name;
+  }
+  QMPIPE_CHECK(false);
+  return {};
+}
+
+template <class Value, std::size_t kCount>
+Result<Value> value_in(const Named<Value> (&table)[kCount], const std::string& name,
+                       const char* what) {
+  std::string known;
+  for (const auto& entry : table) {
+    if (entry.name == name) return entry.value;
+    known += (known.empty() ? "" : ", ") + std::string(entry.name);
+  }
+  return Error{fmt::format("\"{}\" is no {}; choose one of {}", name, what, known)};
+}
+
+bool read_value(const json& value, std::string& into) {
+  if (!value.is_string()) return false;
+  into = value.get<std::string>();
+  return true;
+}
+bool read_value(const json& value, bool& into) {
+  if (!value.is_boolean()) return false;
+  into = value.get<bool>();
+  return true;
+}
+bool read_value(const json& value, std::int32_t& into) {
+  if (!value.is_number_integer()) return false;
+  into = value.get<std::int32_t>();
+  return true;
+}
+bool read_value(const json& value, std::vector<double>& into) {
+  if (!value.is_array()) return false;
+  into.clear();
+  for (const json& element : value) {
+    if (!element.is_number()) return false;
+    into.push_back(element.get<double>());
+  }
+  return true;
+}
+
+// Leaves the first problem that was met in `problem`.
+template <class Value>
+void read_member(const json& object, const char* name, Value& into, std::string& problem) {
+  if (!problem.empty()) return;
+  const auto it = object.find(name);
+  if (it == object.end()) {
+    problem = fmt::format("the recipe has no \"{}\"", name);
+  } else if (!read_value(*it, into)) {
+    problem = fmt::format("the recipe's \"{}\" has the wrong type", name);
+  }
+}
+
+template <class Value>
+void read_named(const json& object, const char* name, Result<Value> (*parse)(const std::string&),
+                Value& into, std::string& problem) {
+  std::string text;
+  read_member(object, name, text, problem);
+  if (!problem.empty()) return;
+  const Result<Value> value = parse(text);
+  if (value) {
+    into = *value;
+  } else {
+    problem = value.error().message;
+  }
+}
+
+Result<Projection> projection_named(const std::string& name) {
+  if (name == "geodetic") return Projection::kGeodetic;
+  if (name == "mercator") return Projection::kMercator;
+  return Error{fmt::format("\"{}\" is no scheme; choose geodetic or mercator", name)};
+}
+
+}  // namespace
+
+std::string name_of(Resampling resampling) { return name_in(kResamplings, resampling); }
+std::string name_of(Reduction reduction) { return name_in(kReductions, reduction); }
+std::string name_of(Method method) { return name_in(kMethods, method); }
+Result<Resampling> resampling_named(const std::string& name) {
+  return value_in(kResamplings, name, "resampling");
+}
+Result<Reduction> reduction_named(const std::string& name) {
+  return value_in(kReductions, name, "reduction");
+}
+Result<Method> method_named(const std::string& name) { return value_in(kMethods, name, "method"); }
+
+std::string name_of(const VoidPolicy& policy) {
+  return policy.kind == VoidPolicy::Kind::kPull ? "pull"
+                                                : fmt::format("height={}", policy.base_height_m);
+}
+
+Result<VoidPolicy> void_policy_named(const std::string& name) {
+  if (name == "pull") return VoidPolicy{};
+  const std::string prefix = "height=";
+  double height_m = 0;
+  const char* end = name.data() + name.size();
+  if (name.starts_with(prefix)) {
+    const auto [stop, code] = std::from_chars(name.data() + prefix.size(), end, height_m);
+    if (code == std::errc() && stop == end && std::abs(height_m) <= 20000) {
+      return VoidPolicy{.kind = VoidPolicy::Kind::kHeight, .base_height_m = height_m};
+    }
+  }
+  return Error{fmt::format(
+      "\"{}\" is no way to fill voids; choose pull or height=H with H in metres (-20000..20000)",
+      name)};
+}
+
+std::string write_recipe(const Recipe& recipe) {
+  const json object = {
+      {"program_version", recipe.program_version},
+      {"scheme", recipe.projection == Projection::kGeodetic ? "geodetic" : "mercator"},
+      {"sampling_zoom", recipe.sampling_zoom},
+      {"min_zoom", recipe.min_zoom},
+      {"max_zoom", recipe.max_zoom},
+      {"resampling", name_of(recipe.resampling)},
+      {"reduce", name_of(recipe.reduction)},
+      {"nodata", name_of(recipe.voids)},
+      {"method", name_of(recipe.method)},
+      {"tolerance_m", recipe.tolerance_m},
+      {"height_step_m", recipe.height_step_m},
+      {"grid", recipe.initial_grid_cells},
+      {"normals", recipe.normals}};
+  return object.dump();
+}
+
+Result<Recipe> parse_recipe(const std::string& text) {
+  const json object = json::parse(text, nullptr, false);
+  if (!object.is_object()) return Error{"the recipe is no JSON object"};
+  Recipe recipe;
+  std::string problem;
+  read_member(object, "program_version", recipe.program_version, problem);
+  read_named(object, "scheme", projection_named, recipe.projection, problem);
+  read_member(object, "sampling_zoom", recipe.sampling_zoom, problem);
+  read_member(object, "min_zoom", recipe.min_zoom, problem);
+  read_member(object, "max_zoom", recipe.max_zoom, problem);
+  read_named(object, "resampling", resampling_named, recipe.resampling, problem);
+  read_named(object, "reduce", reduction_named, recipe.reduction, problem);
+  read_named(object, "nodata", void_policy_named, recipe.voids, problem);
+  read_named(object, "method", method_named, recipe.method, problem);
+  read_member(object, "tolerance_m", recipe.tolerance_m, problem);
+  read_member(object, "height_step_m", recipe.height_step_m, problem);
+  read_member(object, "grid", recipe.initial_grid_cells, problem);
+  read_member(object, "normals", recipe.normals, problem);
+  if (!problem.empty()) return Error{problem};
+  if (recipe.min_zoom < 0 || recipe.max_zoom < recipe.min_zoom ||
+      recipe.sampling_zoom < recipe.max_zoom || recipe.sampling_zoom > kMaxZoom) {
+    return Error{"the recipe's zooms do not fit together"};
+  }
+  const auto zooms = static_cast<std::size_t>(recipe.max_zoom) + 1;
+  if (recipe.tolerance_m.size() != zooms || recipe.height_step_m.size() != zooms) {
+    return Error{"the recipe does not list one tolerance and one height step for each zoom"};
+  }
+  return recipe;
+}
+
+}  // namespace qmpipe

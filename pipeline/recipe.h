@@ -1,0 +1,53 @@
+// Everything that decides a tile set's bytes besides the input: written into layer.json under the
+// key "qmpipe", so that `verify` can recompute the posts and a later run can tell whether it would
+// continue the same work. Threads, memory and sinks are not in it, because bytes do not depend on
+// them.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "formats/result.h"
+#include "scheduler/tiling_scheme.h"
+#include "stages/heightfield.h"
+#include "stages/reduce.h"
+#include "stages/sampling.h"
+
+namespace qmpipe {
+
+enum class Method { kGreedy };
+
+struct Recipe {
+  std::string program_version;
+  Projection projection = Projection::kGeodetic;
+  std::int32_t sampling_zoom = 0;
+  std::int32_t min_zoom = 0;
+  std::int32_t max_zoom = 0;
+  Resampling resampling = Resampling::kBilinear;
+  Reduction reduction = Reduction::kMean;
+  VoidPolicy voids;
+  Method method = Method::kGreedy;
+  // By zoom, 0..max_zoom.
+  std::vector<double> tolerance_m;
+  std::vector<double> height_step_m;
+  std::int32_t initial_grid_cells = 0;
+  bool normals = true;
+  friend bool operator==(const Recipe&, const Recipe&) = default;
+};
+
+// The names used on the command line and in files.
+std::string name_of(Resampling resampling);
+std::string name_of(Reduction reduction);
+std::string name_of(Method method);
+std::string name_of(const VoidPolicy& policy);  // "pull" or "height=H"
+Result<Resampling> resampling_named(const std::string& name);
+Result<Reduction> reduction_named(const std::string& name);
+Result<Method> method_named(const std::string& name);
+Result<VoidPolicy> void_policy_named(const std::string& name);
+
+// JSON text of an object, keys sorted; read back equal.
+std::string write_recipe(const Recipe& recipe);
+Result<Recipe> parse_recipe(const std::string& json);
+
+}  // namespace qmpipe

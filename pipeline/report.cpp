@@ -1,0 +1,90 @@
+#include "pipeline/report.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace qmpipe {
+namespace {
+
+nlohmann::ordered_json zoom_object(const ZoomReport& zoom) {
+  nlohmann::ordered_json object = {{"zoom", zoom.zoom},
+                                   {"tiles", zoom.tiles},
+                                   {"vertices", zoom.vertices},
+                                   {"triangles", zoom.triangles},
+                                   {"plain_bytes", zoom.plain_bytes},
+                                   {"stored_bytes", zoom.stored_bytes},
+                                   {"tolerance_m", zoom.tolerance_m},
+                                   {"height_step_m", zoom.height_step_m},
+                                   {"valid_posts", zoom.error.posts},
+                                   {"max_error_m", zoom.error.largest_m},
+                                   {"mean_error_m", zoom.error.mean_m()},
+                                   {"rms_error_m", zoom.error.rms_m()}};
+  for (std::size_t k = 0; k < kStageCount; ++k) {
+    object["stage_s"][kStageNames[k]] = zoom.seconds[k];
+  }
+  return object;
+}
+
+}  // namespace
+
+void ZoomReport::add(const TileWork& work) {
+  ++tiles;
+  vertices += static_cast<std::int64_t>(work.vertices);
+  triangles += static_cast<std::int64_t>(work.triangles);
+  plain_bytes += static_cast<std::int64_t>(work.plain_bytes);
+  stored_bytes += static_cast<std::int64_t>(work.bytes.size());
+  error.add(work.error);
+  for (std::size_t k = 0; k < kStageCount; ++k) seconds[k] += work.seconds[k];
+}
+
+void BuildReport::add(const TileWork& work) {
+  const auto found = std::find_if(zooms.begin(), zooms.end(), [&work](const ZoomReport& zoom) {
+    return zoom.zoom == work.key.zoom;
+  });
+  QMPIPE_CHECK(found != zooms.end());
+  found->add(work);
+  ++tiles;
+  stored_bytes += static_cast<std::int64_t>(work.bytes.size());
+  // A sum does not depend on the order of its terms.
+  content_hash += work.content_hash;
+}
+
+std::string write_report(const BuildReport& report) {
+  nlohmann::ordered_json object = {{"tiles", report.tiles},
+                                   {"stored_bytes", report.stored_bytes},
+                                   {"threads", report.threads},
+                                   {"survey_s", report.survey_s},
+                                   {"mesh_s", report.mesh_s},
+                                   {"max_in_flight", report.max_in_flight},
+                                   {"largest_in_flight", report.largest_in_flight},
+                                   {"expected_peak_bytes", report.expected_peak_bytes},
+                                   {"peak_resident_bytes", report.peak_resident_bytes}};
+  object["zooms"] = nlohmann::ordered_json::array();
+  for (const ZoomReport& zoom : report.zooms) object["zooms"].push_back(zoom_object(zoom));
+  return object.dump(2) + "\n";
+}
+
+std::string report_table(const BuildReport& report) {
+  std::string text = fmt::format("{:>4} {:>9} {:>9} {:>9} {:>12} {:>12} {:>12} {:>12}\n", "zoom",
+                                 "tiles", "mean V", "mean T", "bytes", "tolerance m",
+                                 "max error m", "RMS error m");
+  for (const ZoomReport& zoom : report.zooms) {
+    const auto tiles = static_cast<double>(std::max<std::int64_t>(1, zoom.tiles));
+    text += fmt::format("{:>4} {:>9} {:>9.1f} {:>9.1f} {:>12} {:>12.3f} {:>12.3f} {:>12.3f}\n",
+                        zoom.zoom, zoom.tiles, static_cast<double>(zoom.vertices) / tiles,
+                        static_cast<double>(zoom.triangles) / tiles, zoom.stored_bytes,
+                        zoom.tolerance_m, zoom.error.largest_m, zoom.error.rms_m());
+  }
+  return text;
+}
+
+std::int64_t peak_resident_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
+}
+
+}  // namespace qmpipe

@@ -1,0 +1,51 @@
+// What a build has made, zoom by zoom: report.json, and the table a person sees.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "pipeline/tile_builder.h"
+
+namespace qmpipe {
+
+struct ZoomReport {
+  std::int32_t zoom = 0;
+  double tolerance_m = 0;
+  double height_step_m = 0;
+  std::int64_t tiles = 0;
+  std::int64_t vertices = 0;
+  std::int64_t triangles = 0;
+  std::int64_t plain_bytes = 0;
+  std::int64_t stored_bytes = 0;
+  ErrorSummary error;
+  StageSeconds seconds{};  // of all threads
+
+  void add(const TileWork& work);
+};
+
+struct BuildReport {
+  std::vector<ZoomReport> zooms;
+  std::int64_t tiles = 0;
+  std::int64_t stored_bytes = 0;
+  std::uint64_t content_hash = 0;  // the same for the same tiles in any order
+  double survey_s = 0;
+  double mesh_s = 0;
+  std::int32_t threads = 0;
+  std::int32_t largest_in_flight = 0;
+  std::int32_t max_in_flight = 0;
+  std::int64_t expected_peak_bytes = 0;
+  std::int64_t peak_resident_bytes = 0;
+
+  void add(const TileWork& work);
+};
+
+// Times and memory of this run are in the report, and only there: it is no part of the tile set.
+std::string write_report(const BuildReport& report);
+std::string report_table(const BuildReport& report);
+
+// The most memory this process has had so far.
+std::int64_t peak_resident_bytes();
+
+}  // namespace qmpipe

@@ -1,0 +1,290 @@
+#include "pipeline/survey.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "formats/errors.h"
+#include "scheduler/check.h"
+
+namespace qmpipe {
+namespace {
+
+constexpr std::size_t kBlockSize = static_cast<std::size_t>(kBlockPosts) * kBlockPosts;
+
+// Blocks are named like tiles; row 2^zoom holds the last row of posts.
+using BlockKey = TileKey;
+
+std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options) {
+  std::vector<std::unique_ptr<RasterSource>> sources;
+  for (const std::string& input : options.inputs) {
+    sources.push_back(RasterSource::open(input, {.crs_override = options.source_crs}));
+  }
+  return std::make_unique<Sampler>(std::move(sources), options.resampling);
+}
+
+// Runs body(k) for 0 <= k < count on the arena's threads; an exception ends the loop and comes out.
+template <class Body>
+void for_each_index(tbb::task_arena& arena, std::size_t count, const Body& body) {
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, count, body);
+  });
+}
+
+std::vector<BlockKey> covered_blocks(const TilingScheme& scheme, std::int32_t zoom,
+                                     const std::vector<RasterInfo>& sources) {
+  const Lattice lattice(scheme, zoom);
+  std::set<BlockKey> blocks;
+  for (const RasterInfo& source : sources) {
+    const RectangleDeg& box = source.bounds_deg;
+    // A post of slack: bounds of projected rasters come from a finite number of edge points.
+    const auto block = [](double post) {
+      return static_cast<std::int32_t>(std::floor(post / kBlockPosts));
+    };
+    const std::int32_t first_x = block(lattice.column_at(box.west_deg) - 1);
+    const std::int32_t last_x = std::min(block(lattice.column_at(box.east_deg) + 1),
+                                         first_x + scheme.columns(zoom) - 1);
+    const std::int32_t first_y = std::max(0, block(lattice.row_at(box.south_deg) - 1));
+    const std::int32_t last_y = std::min(scheme.rows(zoom), block(lattice.row_at(box.north_deg) + 1));
+    for (std::int32_t y = first_y; y <= last_y; ++y) {
+      for (std::int32_t x = first_x; x <= last_x; ++x) {
+        const std::int32_t columns = scheme.columns(zoom);
+        blocks.insert({.zoom = zoom, .x = (x % columns + columns) % columns, .y = y});
+      }
+    }
+  }
+  return {blocks.begin(), blocks.end()};
+}
+
+// The blocks of the next coarser zoom that may have a valid post where the given ones do: a coarse
+// post looks at finer posts one step to each side, so the last row and column of an odd block count
+// in the next block too.
+std::vector<BlockKey> coarser_blocks(const TilingScheme& scheme,
+                                     const std::vector<BlockKey>& blocks) {
+  std::set<BlockKey> coarser;
+  for (const BlockKey& block : blocks) {
+    const std::int32_t zoom = block.zoom - 1;
+    for (const std::int32_t y : {block.y / 2, (block.y + 1) / 2}) {
+      for (const std::int32_t x : {block.x / 2, (block.x + 1) / 2}) {
+        coarser.insert({.zoom = zoom, .x = x % scheme.columns(zoom), .y = y});
+      }
+    }
+  }
+  return {coarser.begin(), coarser.end()};
+}
+
+void keep_present(const LatticeStore& store, std::vector<BlockKey>& blocks) {
+  std::erase_if(blocks, [&store](const BlockKey& block) {
+    return !store.has_block(block.zoom, block.x, block.y);
+  });
+}
+
+class Surveyor {
+ public:
+  Surveyor(const SurveyOptions& options, Progress& progress)
+      : options_(options), progress_(progress), arena_(options.threads) {}
+
+  Survey run();
+
+ private:
+  void sample(std::vector<BlockKey>& blocks);
+  void reduce_to(std::vector<BlockKey>& blocks);
+  void settle_poles(const std::vector<BlockKey>& blocks, std::int32_t zoom);
+  std::optional<float> settle_pole(const std::vector<BlockKey>& blocks, const Lattice& lattice,
+                                   std::int32_t j);
+  void list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom);
+  SurveyedTile examine(const TileKey& key) const;
+
+  const SurveyOptions& options_;
+  Progress& progress_;
+  tbb::task_arena arena_;
+  Survey survey_;
+};
+
+void Surveyor::sample(std::vector<BlockKey>& blocks) {
+  const Lattice lattice(survey_.scheme, survey_.sampling_zoom);
+  // GDAL's datasets belong to one thread; each opens its own when it first has work.
+  tbb::enumerable_thread_specific<std::unique_ptr<Sampler>> samplers(
+      [this] { return open_sampler(options_); });
+  const Phase phase(progress_, "survey", "posts",
+                    static_cast<std::int64_t>(blocks.size() * kBlockSize));
+  for_each_index(arena_, blocks.size(), [&](std::size_t k) {
+    progress_.check_stop();
+    const BlockKey& block = blocks[k];
+    const PostWindow window = {.i0 = block.x * kBlockPosts,
+                               .j0 = block.y * kBlockPosts,
+                               .width_posts = kBlockPosts,
+                               .height_posts = kBlockPosts};
+    std::vector<float> heights_m(kBlockSize);
+    Sampler& sampler = *samplers.local();
+    if (sampler.may_cover(lattice, window)) {
+      sampler.sample(lattice, window, heights_m);
+      survey_.store->put_block(block.zoom, block.x, block.y, heights_m);
+    }
+    progress_.advance(static_cast<std::int64_t>(kBlockSize));
+  });
+  keep_present(*survey_.store, blocks);
+}
+
+void Surveyor::reduce_to(std::vector<BlockKey>& blocks) {
+  for_each_index(arena_, blocks.size(), [&](std::size_t k) {
+    progress_.check_stop();
+    const BlockKey& block = blocks[k];
+    std::vector<float> heights_m(kBlockSize);
+    reduce_block(*survey_.store, survey_.scheme, block.zoom, block.x, block.y, options_.reduction,
+                 heights_m);
+    survey_.store->put_block(block.zoom, block.x, block.y, heights_m);
+  });
+  keep_present(*survey_.store, blocks);
+}
+
+// All posts of a pole row are one point of the globe: they get the mean of those that are valid.
+std::optional<float> Surveyor::settle_pole(const std::vector<BlockKey>& blocks,
+                                           const Lattice& lattice, std::int32_t j) {
+  const std::int32_t zoom = lattice.zoom();
+  std::vector<float> block_m(kBlockSize);
+  const auto row = block_m.begin() + static_cast<std::ptrdiff_t>(j % kBlockPosts) * kBlockPosts;
+  const auto window_of = [](const BlockKey& block) {
+    return PostWindow{.i0 = block.x * kBlockPosts,
+                      .j0 = block.y * kBlockPosts,
+                      .width_posts = kBlockPosts,
+                      .height_posts = kBlockPosts};
+  };
+  double sum_m = 0;
+  std::int64_t count = 0;
+  for (const BlockKey& block : blocks) {
+    if (block.zoom != zoom || block.y != j / kBlockPosts) continue;
+    survey_.store->read(lattice, window_of(block), block_m);
+    std::for_each(row, row + kBlockPosts, [&](float h) {
+      if (std::isnan(h)) return;
+      sum_m += static_cast<double>(h);
+      ++count;
+    });
+  }
+  if (count == 0) return std::nullopt;
+  const auto height_m = static_cast<float>(sum_m / static_cast<double>(count));
+  for (const BlockKey& block : blocks) {
+    if (block.zoom != zoom || block.y != j / kBlockPosts) continue;
+    survey_.store->read(lattice, window_of(block), block_m);
+    std::replace_if(row, row + kBlockPosts, [](float h) { return !std::isnan(h); }, height_m);
+    survey_.store->put_block(zoom, block.x, block.y, block_m);
+  }
+  return height_m;
+}
+
+void Surveyor::settle_poles(const std::vector<BlockKey>& blocks, std::int32_t zoom) {
+  const Lattice lattice(survey_.scheme, zoom);
+  PoleHeights& poles = survey_.pole_heights[static_cast<std::size_t>(zoom)];
+  if (!lattice.is_pole_row(0)) return;
+  poles[0] = settle_pole(blocks, lattice, 0);
+  poles[1] = settle_pole(blocks, lattice, lattice.rows() - 1);
+}
+
+SurveyedTile Surveyor::examine(const TileKey& key) const {
+  const Lattice lattice(survey_.scheme, key.zoom);
+  const PostWindow window = Lattice::tile_window(key, 0);
+  std::vector<float> heights_m(window.size());
+  survey_.store->read(lattice, window, heights_m);
+  SurveyedTile tile{.key = key,
+                    .lowest_m = std::numeric_limits<float>::max(),
+                    .highest_m = std::numeric_limits<float>::lowest()};
+  for (std::int32_t j = 0; j < window.height_posts; ++j) {
+    if (lattice.is_pole_row(window.j0 + j)) continue;
+    const float* row = heights_m.data() + static_cast<std::ptrdiff_t>(j) * window.width_posts;
+    for (std::int32_t i = 0; i < window.width_posts; ++i) {
+      if (std::isnan(row[i])) continue;
+      tile.lowest_m = std::min(tile.lowest_m, row[i]);
+      tile.highest_m = std::max(tile.highest_m, row[i]);
+      ++tile.valid_posts;
+    }
+  }
+  return tile;
+}
+
+void Surveyor::list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom) {
+  const TilingScheme& scheme = survey_.scheme;
+  const std::int32_t columns = scheme.columns(zoom);
+  // A block's first row and column lie on the tiles to its south and west too.
+  std::set<TileKey> candidates;
+  for (const BlockKey& block : blocks) {
+    for (const std::int32_t y : {block.y - 1, block.y}) {
+      for (const std::int32_t x : {block.x - 1, block.x}) {
+        const TileKey key = {.zoom = zoom, .x = (x + columns) % columns, .y = y};
+        if (scheme.contains(key)) candidates.insert(key);
+      }
+    }
+  }
+  const std::vector<TileKey> keys(candidates.begin(), candidates.end());
+  auto& tiles = survey_.tiles[static_cast<std::size_t>(zoom)];
+  tiles.resize(keys.size());
+  for_each_index(arena_, keys.size(), [&](std::size_t k) {
+    progress_.check_stop();
+    tiles[k] = examine(keys[k]);
+  });
+  std::erase_if(tiles, [](const SurveyedTile& tile) { return tile.valid_posts == 0; });
+}
+
+Survey Surveyor::run() {
+  const auto started = std::chrono::steady_clock::now();
+  survey_.sources = describe_inputs(options_);
+  survey_.scheme = options_.scheme;
+  survey_.sampling_zoom = chosen_sampling_zoom(options_, survey_.sources);
+  survey_.max_zoom = options_.max_zoom < 0 ? survey_.sampling_zoom : options_.max_zoom;
+  survey_.store = make_memory_lattice_store(survey_.scheme, survey_.sampling_zoom);
+  survey_.pole_heights.resize(static_cast<std::size_t>(survey_.sampling_zoom) + 1);
+  survey_.tiles.resize(static_cast<std::size_t>(survey_.max_zoom) + 1);
+
+  std::vector<BlockKey> blocks =
+      covered_blocks(survey_.scheme, survey_.sampling_zoom, survey_.sources);
+  sample(blocks);
+  for (std::int32_t zoom = survey_.sampling_zoom; zoom >= 0; --zoom) {
+    if (zoom < survey_.sampling_zoom) {
+      blocks = coarser_blocks(survey_.scheme, blocks);
+      reduce_to(blocks);
+    }
+    settle_poles(blocks, zoom);
+    if (zoom <= survey_.max_zoom) list_tiles(blocks, zoom);
+  }
+  survey_.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  return std::move(survey_);
+}
+
+}  // namespace
+
+std::int32_t chosen_sampling_zoom(const SurveyOptions& options,
+                                  const std::vector<RasterInfo>& sources) {
+  if (options.sampling_zoom >= 0) return options.sampling_zoom;
+  return std::max(sampling_zoom_for(options.scheme, sources), options.max_zoom);
+}
+
+std::vector<RasterInfo> describe_inputs(const SurveyOptions& options) {
+  if (options.inputs.empty()) throw UsageError("no input: name at least one raster");
+  std::vector<RasterInfo> infos;
+  for (const std::string& input : options.inputs) {
+    infos.push_back(RasterSource::open(input, {.crs_override = options.source_crs})->info());
+  }
+  return infos;
+}
+
+Survey run_survey(const SurveyOptions& options, Progress& progress) {
+  QMPIPE_CHECK(options.threads >= 1);
+  return Surveyor(options, progress).run();
+}
+
+std::int64_t expected_lattice_bytes(const TilingScheme& scheme, std::int32_t sampling_zoom,
+                                    const std::vector<RasterInfo>& sources) {
+  const auto blocks =
+      static_cast<std::int64_t>(covered_blocks(scheme, sampling_zoom, sources).size());
+  // Coarser zooms add a third, and a block for each zoom's rounding.
+  const auto block_bytes = static_cast<std::int64_t>(kBlockSize * sizeof(float));
+  return (blocks + blocks / 3 + 4 * sampling_zoom) * block_bytes;
+}
+
+}  // namespace qmpipe

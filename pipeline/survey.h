@@ -1,0 +1,69 @@
+// The first pass over the source: samples the posts of the sampling zoom, reduces them 2:1 down to
+// zoom 0, and learns which tiles have data and how high they are (DESIGN 3).
+//
+// Guarantees: the lattice store it fills depends on the sources, the scheme and the options alone,
+// not on threads. Throws IoError when a source cannot be read, Interrupted when asked to stop.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "formats/lattice_store.h"
+#include "formats/raster_source.h"
+#include "pipeline/progress.h"
+#include "stages/heightfield.h"
+#include "stages/reduce.h"
+#include "stages/sampling.h"
+
+namespace qmpipe {
+
+struct SurveyOptions {
+  std::vector<std::string> inputs;  // in order of priority
+  std::string source_crs;           // overrides the inputs' CRS when not empty
+  Resampling resampling = Resampling::kBilinear;
+  Reduction reduction = Reduction::kMean;
+  TilingScheme scheme{Projection::kGeodetic};
+  // -1: chosen from the sources' pixels (sampling_zoom_for), deepened to at least max_zoom.
+  std::int32_t sampling_zoom = -1;
+  // Deepest zoom for which tiles are listed; -1: the sampling zoom.
+  std::int32_t max_zoom = -1;
+  std::int32_t threads = 1;
+};
+
+// A tile with at least one valid post, and the range of its valid posts (257 x 257, sides included).
+struct SurveyedTile {
+  TileKey key;
+  float lowest_m = 0;
+  float highest_m = 0;
+  std::int32_t valid_posts = 0;
+};
+
+struct Survey {
+  std::vector<RasterInfo> sources;
+  TilingScheme scheme{Projection::kGeodetic};
+  std::int32_t sampling_zoom = 0;
+  std::int32_t max_zoom = 0;
+  std::unique_ptr<LatticeStore> store;    // zooms 0..sampling_zoom
+  std::vector<PoleHeights> pole_heights;  // by zoom
+  // By zoom 0..max_zoom, each sorted by key; pole rows alone do not make a tile.
+  std::vector<std::vector<SurveyedTile>> tiles;
+  double seconds = 0;
+};
+
+// The sampling zoom that run_survey() will use for these sources.
+std::int32_t chosen_sampling_zoom(const SurveyOptions& options,
+                                  const std::vector<RasterInfo>& sources);
+
+// Opens the inputs to learn about them: throws IoError for one that cannot be used, UsageError when
+// there is none.
+std::vector<RasterInfo> describe_inputs(const SurveyOptions& options);
+
+Survey run_survey(const SurveyOptions& options, Progress& progress);
+
+// What the lattice of these sources will take at most.
+std::int64_t expected_lattice_bytes(const TilingScheme& scheme, std::int32_t sampling_zoom,
+                                    const std::vector<RasterInfo>& sources);
+
+}  // namespace qmpipe
