@@ -1,10 +1,12 @@
 // A tile set as a folder: {z}/{x}/{y}.terrain and layer.json, ready for any static server.
 // Every file is written under a temporary name and renamed, so a file that has its name is whole.
+// close() syncs the tiles to disk before it writes layer.json.
 #pragma once
 
 #include <filesystem>
 #include <memory>
 
+#include "formats/file_bytes.h"
 #include "formats/tile_sink.h"
 
 namespace qmpipe {
@@ -12,12 +14,10 @@ namespace qmpipe {
 enum class Overwrite { kNo, kYes };
 
 // Creates the folder (and its parents). Throws IoError when it cannot be written to, or when it
-// holds anything and `overwrite` is kNo; with kYes an earlier tile set in it (layer.json,
-// report.json, numbered zoom folders) is removed first, and nothing else.
+// holds anything and `overwrite` is kNo; with kYes an earlier tile set in it is removed first:
+// layer.json, report.json, the tiles in numbered zoom folders, files left by an interrupted write,
+// and the folders this empties. Nothing else is touched.
 std::unique_ptr<TileSink> open_folder_sink(const std::filesystem::path& folder,
                                            Overwrite overwrite);
-
-// Writes a whole file under a temporary name in the same folder, then renames it. Throws IoError.
-void write_file_atomically(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 
 }  // namespace qmpipe

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -11,12 +12,32 @@
 
 namespace qmpipe {
 
-// level: 1 (fast) .. 12 (small).
+// Keeps the compressor's tables (hundreds of kB, up to some MB at high levels) between calls: one
+// for each thread; a call may not run while another one does.
+class GzipCompressor {
+ public:
+  // level: 1 (fast) .. 12 (small). REQUIRES: within that range.
+  explicit GzipCompressor(int level);
+  ~GzipCompressor();
+  GzipCompressor(GzipCompressor&&) noexcept;
+  GzipCompressor& operator=(GzipCompressor&&) noexcept;
+
+  // One whole member. The result depends on `plain` and the level alone.
+  std::vector<std::uint8_t> compress(std::span<const std::uint8_t> plain);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// For a single call; sets up a compressor and throws it away.
 std::vector<std::uint8_t> gzip_compress(std::span<const std::uint8_t> plain, int level);
 
 bool is_gzip(std::span<const std::uint8_t> bytes);
 
-// Refuses damaged data and anything that would grow past limit_bytes.
+// Accepts exactly one member. Refuses damaged data, anything after the member, and what would grow
+// past limit_bytes. Memory stays below about 1100 times the packed size and limit_bytes, whatever
+// the data says of itself.
 Result<std::vector<std::uint8_t>> gzip_decompress(std::span<const std::uint8_t> packed,
                                                   std::size_t limit_bytes);
 

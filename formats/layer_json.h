@@ -27,6 +27,7 @@ struct TileRange {
 };
 
 struct LayerJson {
+  // Texts are UTF-8; other bytes are written as U+FFFD.
   std::string name;
   std::string description;
   std::string version = "1.0.0";
@@ -39,8 +40,9 @@ struct LayerJson {
   RectangleDeg bounds_deg;
   // available[zoom]; empty list for a zoom without tiles.
   std::vector<std::vector<TileRange>> available;
-  // What qmpipe needs to know again to verify or extend the set, as JSON text of an object; written
-  // under the key "qmpipe", which clients ignore. Empty in other programs' sets.
+  // What qmpipe needs to know again to verify or extend the set: JSON text of an object, without
+  // blanks (as nlohmann's dump() gives it); written under the key "qmpipe", which clients ignore.
+  // Empty in other programs' sets.
   std::string qmpipe_json;
   friend bool operator==(const LayerJson&, const LayerJson&) = default;
 };
@@ -49,16 +51,18 @@ struct LayerJson {
 // REQUIRES: keys sorted, all of one zoom, no key twice.
 std::vector<TileRange> merge_ranges(std::span<const TileKey> keys);
 
+// REQUIRES: finite bounds; qmpipe_json empty or a JSON object.
 std::string write_layer_json(const LayerJson& layer);
 
 // Tolerant of other programs' sets (unknown keys, missing optional keys, "schema" for "scheme"), so
 // that they can be examined; what it had to tolerate is listed in `complaints`. Refuses what is no
-// JSON object or has ill-typed known keys.
+// JSON object, has ill-typed known keys, an unknown projection or nests deeper than 64 levels.
+// Ranges stand as the file gives them, even reversed or outside the scheme (there is a complaint).
 struct ParsedLayerJson {
   LayerJson layer;
   std::string format;
   std::string scheme;
-  bool has_max_zoom = false;
+  bool has_max_zoom = false;  // where not, layer.max_zoom is the deepest zoom of `available`
   std::optional<std::int32_t> metadata_availability;
   std::vector<std::string> complaints;
 };

@@ -25,12 +25,15 @@ class MemoryLatticeStore final : public LatticeStore {
                  std::span<const float> heights_m) override {
     QMPIPE_CHECK(heights_m.size() == kBlockSize && zoom >= 0 && zoom <= max_zoom_);
     QMPIPE_CHECK(bx >= 0 && bx < scheme_.columns(zoom) && by >= 0 && by <= scheme_.rows(zoom));
+    const TileKey key = {.zoom = zoom, .x = bx, .y = by};
     if (std::all_of(heights_m.begin(), heights_m.end(), [](float h) { return std::isnan(h); })) {
+      const std::scoped_lock lock(mutex_);
+      blocks_.erase(key);
       return;
     }
     std::vector<float> block(heights_m.begin(), heights_m.end());
     const std::scoped_lock lock(mutex_);
-    blocks_.insert_or_assign({.zoom = zoom, .x = bx, .y = by}, std::move(block));
+    blocks_.insert_or_assign(key, std::move(block));
   }
 
   bool has_block(std::int32_t zoom, std::int32_t bx, std::int32_t by) const override {

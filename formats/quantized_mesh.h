@@ -56,13 +56,15 @@ struct QuantizedMesh {
 // The tile's bytes, uncompressed: 16-bit indices up to 65,535 vertices, 32-bit from 65,537.
 // REQUIRES: vertices numbered in order of first use by the triangles; 1..N vertices, not exactly
 // 65,536; u, v, h of one length and <= 32767; every index < vertex count; normals empty or one for
-// each vertex.
+// each vertex; a water mask of 0, 1 or 65,536 bytes; no side longer than the vertices.
 std::vector<std::uint8_t> encode(const QuantizedMesh& mesh);
 
 // Reads a tile that may be damaged or hostile. Never throws, never reads past the end, allocates
 // only what the bytes can hold. Strict: refuses truncated data, out-of-range indices and codes,
-// values above 32767, trailing bytes that form no extension, lists longer than the vertices allow.
-// Unknown extensions are skipped by their length.
+// values above 32767, trailing bytes that form no extension, lists longer than the vertices allow,
+// known extensions of a wrong length or given twice, no vertices or exactly 65,536.
+// Unknown extensions are skipped by their length. Header fields and metadata are taken as they are
+// (NaN included). What it returns, encode() accepts.
 Result<QuantizedMesh> decode(std::span<const std::uint8_t> bytes);
 
 }  // namespace qmpipe

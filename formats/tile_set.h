@@ -14,20 +14,27 @@
 
 namespace qmpipe {
 
+// No tile and no layer.json is read that is larger than this.
+inline constexpr std::size_t kLargestTileBytes = std::size_t{256} << 20U;
+
 class TileSet {
  public:
   virtual ~TileSet() = default;
   // The text of layer.json, or why it cannot be had.
   virtual Result<std::string> layer_text() const = 0;
-  // Every tile that is there, sorted. Files that look like tiles but lie outside any scheme
-  // (x or y not a number, zoom above kMaxZoom) are listed in strays().
+  // Every tile that is there, sorted. What looks like a tile but can be none (x or y not a plain
+  // number, outside the geodetic scheme, zoom above kMaxZoom, left by an interrupted write) is
+  // listed in strays(), sorted, as paths within the set.
   virtual const std::vector<TileKey>& keys() const = 0;
   virtual const std::vector<std::string>& strays() const = 0;
-  // A tile's bytes as stored (maybe gzipped).
+  // A tile's bytes as stored (maybe gzipped), and their number without reading them.
   virtual Result<std::vector<std::uint8_t>> read(const TileKey& key) const = 0;
+  virtual Result<std::int64_t> stored_bytes(const TileKey& key) const = 0;
 };
 
-// Throws IoError when the path cannot be opened as a tile set.
+// `path`: the set's folder, or the layer.json in it. Throws IoError when it cannot be opened as a
+// tile set: not there, no folder, neither a layer.json nor a tile in it, or a folder of it that
+// cannot be listed.
 std::unique_ptr<TileSet> open_tile_set(const std::filesystem::path& path);
 
 // A tile's bytes without gzip, where there was any; refuses what would exceed 256 MiB.

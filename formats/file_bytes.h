@@ -1,0 +1,30 @@
+// Whole files in and out, with errors that say why.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "formats/result.h"
+
+namespace qmpipe {
+
+// What the name of a file under way ends with; such a file is the rest of an interrupted write.
+inline constexpr const char* kTemporarySuffix = ".qmpipe-tmp";
+
+// Writes a whole file under a temporary name in the same folder, then renames it: the file has its
+// name only when it is whole, and an older file of that name stays until then. Not synced to disk.
+// REQUIRES: no other thread writes the same path. Throws IoError with the system's reason and a
+// remedy; then nothing is left behind.
+void write_file_atomically(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+
+// Refuses what is no regular file, cannot be read or is larger than limit_bytes.
+Result<std::vector<std::uint8_t>> read_file_bytes(const std::filesystem::path& path,
+                                                  std::size_t limit_bytes);
+
+// "free some space or choose another disk" and the like, for an errno value; empty for reasons that
+// explain themselves.
+std::string remedy_for_errno(int error_number);
+
+}  // namespace qmpipe

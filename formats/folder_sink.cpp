@@ -1,0 +1,143 @@
+#include "formats/folder_sink.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <string>
+#include <system_error>
+#include <unordered_set>
+#include <vector>
+
+#include "formats/errors.h"
+#include "formats/tile_path.h"
+#include "scheduler/check.h"
+
+namespace qmpipe {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void throw_io_error(const char* what_failed, const fs::path& path,
+                                 const std::error_code& code) {
+  throw IoError(what_failed, path.string(), code.message(), remedy_for_errno(code.value()));
+}
+
+void make_folders(const fs::path& folder) {
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code) throw_io_error("cannot create the folder", folder, code);
+}
+
+std::vector<fs::directory_entry> entries_of(const fs::path& folder) {
+  std::error_code code;
+  std::vector<fs::directory_entry> entries;
+  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    entries.push_back(*it);
+  }
+  if (code) throw_io_error("cannot list the folder", folder, code);
+  return entries;
+}
+
+bool is_temporary(const fs::path& path) { return path.string().ends_with(kTemporarySuffix); }
+
+// Symbolic links are not followed: what they point to is not ours.
+bool is_own_folder(const fs::directory_entry& entry) {
+  std::error_code code;
+  return entry.symlink_status(code).type() == fs::file_type::directory &&
+         parse_tile_number(entry.path().filename().string()).has_value();
+}
+
+void remove_file(const fs::path& path) {
+  std::error_code code;
+  fs::remove(path, code);
+  if (code) throw_io_error("cannot remove", path, code);
+}
+
+void remove_folder_if_empty(const fs::path& folder) {
+  std::error_code code;
+  fs::remove(folder, code);
+  if (code && code != std::errc::directory_not_empty) {
+    throw_io_error("cannot remove the folder", folder, code);
+  }
+}
+
+void remove_tiles_of_column(const fs::path& x_folder) {
+  for (const fs::directory_entry& entry : entries_of(x_folder)) {
+    const bool is_tile = parse_tile_path(entry.path()).has_value();
+    if (is_tile || is_temporary(entry.path())) remove_file(entry.path());
+  }
+  remove_folder_if_empty(x_folder);
+}
+
+void remove_tile_set(const fs::path& folder) {
+  for (const char* name : {"layer.json", "report.json"}) remove_file(folder / name);
+  for (const fs::directory_entry& entry : entries_of(folder)) {
+    if (is_temporary(entry.path())) remove_file(entry.path());
+    if (!is_own_folder(entry)) continue;
+    for (const fs::directory_entry& x_entry : entries_of(entry.path())) {
+      if (is_own_folder(x_entry)) remove_tiles_of_column(x_entry.path());
+    }
+    remove_folder_if_empty(entry.path());
+  }
+}
+
+// Also where a file system that allocates late reports a full disk.
+void sync_file_system_of(const fs::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const int error = descriptor < 0 || ::syncfs(descriptor) != 0 ? errno : 0;
+  if (descriptor >= 0) ::close(descriptor);
+  if (error != 0) {
+    throw_io_error("cannot sync", folder, std::error_code(error, std::generic_category()));
+  }
+}
+
+class FolderSink final : public TileSink {
+ public:
+  explicit FolderSink(fs::path folder) : folder_(std::move(folder)) {}
+
+  void write(const TileKey& key, std::span<const std::uint8_t> bytes) override {
+    QMPIPE_CHECK(!is_closed_);
+    const fs::path path = folder_ / tile_file_name(key);
+    const TileKey column = {.zoom = key.zoom, .x = key.x, .y = 0};
+    if (!made_columns_.contains(column)) {
+      make_folders(path.parent_path());
+      made_columns_.insert(column);
+    }
+    write_file_atomically(path, bytes);
+  }
+
+  void close(const LayerJson& layer) override {
+    QMPIPE_CHECK(!is_closed_);
+    sync_file_system_of(folder_);
+    const std::string text = write_layer_json(layer);
+    const std::vector<std::uint8_t> bytes(text.begin(), text.end());
+    write_file_atomically(folder_ / "layer.json", bytes);
+    is_closed_ = true;
+  }
+
+ private:
+  fs::path folder_;
+  // Keys with y = 0 stand for their x folder.
+  std::unordered_set<TileKey, TileKeyHash> made_columns_;
+  bool is_closed_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<TileSink> open_folder_sink(const fs::path& folder, Overwrite overwrite) {
+  make_folders(folder);
+  if (overwrite == Overwrite::kYes) {
+    remove_tile_set(folder);
+  } else if (!entries_of(folder).empty()) {
+    throw IoError("cannot start a tile set in", folder.string(), "the folder is not empty",
+                  "Choose another folder, or pass --overwrite to replace the tile set in it.");
+  }
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
+    throw_io_error("cannot write to the folder", folder,
+                   std::error_code(errno, std::generic_category()));
+  }
+  return std::make_unique<FolderSink>(folder);
+}
+
+}  // namespace qmpipe

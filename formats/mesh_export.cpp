@@ -1,0 +1,205 @@
+#include "formats/mesh_export.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "formats/errors.h"
+#include "formats/file_bytes.h"
+#include "formats/little_endian.h"
+#include "scheduler/check.h"
+
+namespace qmpipe {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+template <class T>
+void append(Bytes& bytes, T value) {
+  bytes.resize(bytes.size() + sizeof(T));
+  store_little_endian(bytes.data() + bytes.size() - sizeof(T), value);
+}
+
+Bytes ply_bytes(const ExportMesh& mesh) {
+  std::string header = fmt::format(
+      "ply\nformat binary_little_endian 1.0\ncomment written by qmpipe, metres, z up\n"
+      "element vertex {}\nproperty double x\nproperty double y\nproperty double z\n",
+      mesh.positions_m.size());
+  if (!mesh.normals.empty()) {
+    header += "property float nx\nproperty float ny\nproperty float nz\n";
+  }
+  header += fmt::format("element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+                        mesh.indices.size() / 3);
+  Bytes bytes(header.begin(), header.end());
+  for (std::size_t i = 0; i < mesh.positions_m.size(); ++i) {
+    for (const double value : mesh.positions_m[i]) append(bytes, value);
+    if (mesh.normals.empty()) continue;
+    for (const float value : mesh.normals[i]) append(bytes, value);
+  }
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    append(bytes, std::uint8_t{3});
+    for (std::size_t k = 0; k < 3; ++k) append(bytes, mesh.indices[i + k]);
+  }
+  return bytes;
+}
+
+Bytes obj_bytes(const ExportMesh& mesh) {
+  Bytes bytes;
+  auto out = std::back_inserter(bytes);
+  fmt::format_to(out, "# written by qmpipe, metres, z up\n");
+  for (const Vec3& p : mesh.positions_m) fmt::format_to(out, "v {} {} {}\n", p[0], p[1], p[2]);
+  for (const auto& n : mesh.normals) fmt::format_to(out, "vn {} {} {}\n", n[0], n[1], n[2]);
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    fmt::format_to(out, "f");
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint64_t number = std::uint64_t{mesh.indices[i + k]} + 1;
+      if (mesh.normals.empty()) {
+        fmt::format_to(out, " {}", number);
+      } else {
+        fmt::format_to(out, " {}//{}", number, number);
+      }
+    }
+    fmt::format_to(out, "\n");
+  }
+  return bytes;
+}
+
+using Float3 = std::array<float, 3>;
+
+template <class T>
+Float3 y_up(const std::array<T, 3>& p) {
+  return {static_cast<float>(p[0]), static_cast<float>(p[2]), static_cast<float>(-p[1])};
+}
+
+// glTF's numbers for component types and buffer targets.
+constexpr int kFloat32 = 5126;
+constexpr int kUint32 = 5125;
+constexpr int kVertexData = 34962;
+constexpr int kIndexData = 34963;
+
+// The JSON and the binary chunk as they grow.
+struct GlbParts {
+  nlohmann::ordered_json accessors = nlohmann::ordered_json::array();
+  nlohmann::ordered_json views = nlohmann::ordered_json::array();
+  Bytes binary;
+
+  // Everything that was appended since `begin` becomes one view with one accessor.
+  std::size_t add_accessor(std::size_t begin, int target, nlohmann::ordered_json accessor) {
+    views.push_back({{"buffer", 0},
+                     {"byteOffset", begin},
+                     {"byteLength", binary.size() - begin},
+                     {"target", target}});
+    accessor["bufferView"] = views.size() - 1;
+    accessors.push_back(std::move(accessor));
+    return accessors.size() - 1;
+  }
+};
+
+std::size_t add_positions(GlbParts& parts, const ExportMesh& mesh) {
+  const std::size_t begin = parts.binary.size();
+  Float3 low = y_up(mesh.positions_m.front());
+  Float3 high = low;
+  for (const Vec3& position : mesh.positions_m) {
+    const Float3 p = y_up(position);
+    for (std::size_t k = 0; k < 3; ++k) {
+      append(parts.binary, p[k]);
+      low[k] = std::min(low[k], p[k]);
+      high[k] = std::max(high[k], p[k]);
+    }
+  }
+  return parts.add_accessor(begin, kVertexData,
+                            {{"componentType", kFloat32},
+                             {"count", mesh.positions_m.size()},
+                             {"type", "VEC3"},
+                             {"min", {low[0], low[1], low[2]}},
+                             {"max", {high[0], high[1], high[2]}}});
+}
+
+std::size_t add_normals(GlbParts& parts, const ExportMesh& mesh) {
+  const std::size_t begin = parts.binary.size();
+  for (const Float3& normal : mesh.normals) {
+    for (const float value : y_up(normal)) append(parts.binary, value);
+  }
+  return parts.add_accessor(
+      begin, kVertexData,
+      {{"componentType", kFloat32}, {"count", mesh.normals.size()}, {"type", "VEC3"}});
+}
+
+std::size_t add_indices(GlbParts& parts, const ExportMesh& mesh) {
+  const std::size_t begin = parts.binary.size();
+  for (const std::uint32_t index : mesh.indices) append(parts.binary, index);
+  return parts.add_accessor(
+      begin, kIndexData,
+      {{"componentType", kUint32}, {"count", mesh.indices.size()}, {"type", "SCALAR"}});
+}
+
+Bytes glb_bytes(const ExportMesh& mesh) {
+  GlbParts parts;
+  nlohmann::ordered_json attributes;
+  attributes["POSITION"] = add_positions(parts, mesh);
+  if (!mesh.normals.empty()) attributes["NORMAL"] = add_normals(parts, mesh);
+  const std::size_t indices = add_indices(parts, mesh);
+
+  nlohmann::ordered_json document;
+  document["asset"] = {{"version", "2.0"}, {"generator", "qmpipe"}};
+  document["scene"] = 0;
+  document["scenes"] = nlohmann::ordered_json::array({{{"nodes", {0}}}});
+  document["nodes"] = nlohmann::ordered_json::array({{{"mesh", 0}}});
+  nlohmann::ordered_json primitive = {{"attributes", attributes}, {"indices", indices}};
+  nlohmann::ordered_json gltf_mesh;
+  gltf_mesh["primitives"] = nlohmann::ordered_json::array({primitive});
+  document["meshes"] = nlohmann::ordered_json::array({gltf_mesh});
+  document["buffers"] = nlohmann::ordered_json::array({{{"byteLength", parts.binary.size()}}});
+  document["bufferViews"] = std::move(parts.views);
+  document["accessors"] = std::move(parts.accessors);
+  std::string json = document.dump();
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+
+  constexpr std::uint32_t kGltf = 0x46546C67;
+  constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
+  constexpr std::uint32_t kBinaryChunk = 0x004E4942;
+  Bytes bytes;
+  append(bytes, kGltf);
+  append(bytes, std::uint32_t{2});
+  append(bytes, static_cast<std::uint32_t>(12 + 8 + json.size() + 8 + parts.binary.size()));
+  append(bytes, static_cast<std::uint32_t>(json.size()));
+  append(bytes, kJsonChunk);
+  bytes.insert(bytes.end(), json.begin(), json.end());
+  append(bytes, static_cast<std::uint32_t>(parts.binary.size()));
+  append(bytes, kBinaryChunk);
+  // Only whole floats and indices: a multiple of 4 bytes already.
+  bytes.insert(bytes.end(), parts.binary.begin(), parts.binary.end());
+  return bytes;
+}
+
+void check_mesh(const ExportMesh& mesh) {
+  QMPIPE_CHECK(!mesh.positions_m.empty());
+  QMPIPE_CHECK(!mesh.indices.empty() && mesh.indices.size() % 3 == 0);
+  QMPIPE_CHECK(mesh.normals.empty() || mesh.normals.size() == mesh.positions_m.size());
+  QMPIPE_CHECK(*std::max_element(mesh.indices.begin(), mesh.indices.end()) <
+               mesh.positions_m.size());
+}
+
+}  // namespace
+
+void write_mesh_file(const std::filesystem::path& path, const ExportMesh& mesh) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const bool is_known = extension == ".ply" || extension == ".obj" || extension == ".glb";
+  if (!is_known) {
+    throw UsageError(fmt::format(
+        "cannot tell the mesh format of {} from its extension; end it in .ply, .obj or .glb",
+        path.string()));
+  }
+  check_mesh(mesh);
+  if (extension == ".ply") return write_file_atomically(path, ply_bytes(mesh));
+  if (extension == ".obj") return write_file_atomically(path, obj_bytes(mesh));
+  write_file_atomically(path, glb_bytes(mesh));
+}
+
+}  // namespace qmpipe

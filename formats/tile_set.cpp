@@ -1,0 +1,169 @@
+#include "formats/tile_set.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <system_error>
+
+#include "formats/errors.h"
+#include "formats/file_bytes.h"
+#include "formats/gzip.h"
+#include "formats/tile_path.h"
+
+namespace qmpipe {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_all_digits(const std::string& text) {
+  return !text.empty() && std::all_of(text.begin(), text.end(),
+                                      [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+bool looks_like_tile(const fs::path& path) {
+  const std::string name = path.filename().string();
+  return name.ends_with(kTileExtension) ||
+         name.ends_with(std::string(kTileExtension) + kTemporarySuffix);
+}
+
+// The geodetic scheme is the wider one.
+bool is_in_some_scheme(const TileKey& key) {
+  return key.zoom <= kMaxZoom && TilingScheme(Projection::kGeodetic).contains(key);
+}
+
+class Scanner {
+ public:
+  explicit Scanner(const fs::path& folder) : folder_(folder) {}
+
+  // Three levels deep at most, so that links in a circle do no harm.
+  void run() {
+    for_each_entry(folder_, [this](const fs::directory_entry& entry) {
+      if (is_folder(entry) && is_all_digits(entry.path().filename().string())) {
+        scan_zoom(entry.path());
+      } else {
+        note_stray(entry);
+      }
+    });
+    std::sort(keys.begin(), keys.end());
+    std::sort(strays.begin(), strays.end());
+  }
+
+  std::vector<TileKey> keys;
+  std::vector<std::string> strays;
+
+ private:
+  template <class Visit>
+  static void for_each_entry(const fs::path& folder, const Visit& visit) {
+    std::error_code code;
+    for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+      visit(*it);
+    }
+    if (code) {
+      throw IoError("cannot list the folder", folder.string(), code.message(),
+                    remedy_for_errno(code.value()));
+    }
+  }
+
+  static bool is_folder(const fs::directory_entry& entry) {
+    std::error_code code;
+    return entry.is_directory(code);
+  }
+
+  void scan_zoom(const fs::path& zoom_folder) {
+    for_each_entry(zoom_folder, [this](const fs::directory_entry& entry) {
+      if (is_folder(entry)) {
+        for_each_entry(entry.path(), [this](const fs::directory_entry& e) { scan_tile(e); });
+      } else {
+        note_stray(entry);
+      }
+    });
+  }
+
+  void scan_tile(const fs::directory_entry& entry) {
+    std::error_code code;
+    const std::optional<TileKey> key = parse_tile_path(entry.path());
+    if (key && is_in_some_scheme(*key) && entry.is_regular_file(code)) {
+      keys.push_back(*key);
+    } else {
+      note_stray(entry);
+    }
+  }
+
+  void note_stray(const fs::directory_entry& entry) {
+    if (looks_like_tile(entry.path())) {
+      strays.push_back(entry.path().lexically_relative(folder_).generic_string());
+    }
+  }
+
+  fs::path folder_;
+};
+
+class FolderTileSet final : public TileSet {
+ public:
+  explicit FolderTileSet(fs::path folder) : folder_(std::move(folder)) {
+    Scanner scanner(folder_);
+    scanner.run();
+    keys_ = std::move(scanner.keys);
+    strays_ = std::move(scanner.strays);
+  }
+
+  Result<std::string> layer_text() const override {
+    const auto bytes = read_file_bytes(folder_ / "layer.json", kLargestTileBytes);
+    if (!bytes) return bytes.error();
+    return std::string(bytes->begin(), bytes->end());
+  }
+  const std::vector<TileKey>& keys() const override { return keys_; }
+  const std::vector<std::string>& strays() const override { return strays_; }
+
+  Result<std::vector<std::uint8_t>> read(const TileKey& key) const override {
+    return read_file_bytes(folder_ / tile_file_name(key), kLargestTileBytes);
+  }
+  Result<std::int64_t> stored_bytes(const TileKey& key) const override {
+    std::error_code code;
+    const fs::path path = folder_ / tile_file_name(key);
+    const std::uintmax_t size = fs::file_size(path, code);
+    if (code) return Error{fmt::format("cannot read {}: {}", path.string(), code.message())};
+    return static_cast<std::int64_t>(size);
+  }
+
+ private:
+  fs::path folder_;
+  std::vector<TileKey> keys_;
+  std::vector<std::string> strays_;
+};
+
+}  // namespace
+
+std::unique_ptr<TileSet> open_tile_set(const fs::path& path) {
+  std::error_code code;
+  const bool is_layer_json = path.filename() == "layer.json" && fs::is_regular_file(path, code);
+  fs::path folder = is_layer_json ? path.parent_path() : path;
+  if (folder.empty()) folder = ".";
+  if (!fs::exists(folder, code)) {
+    throw IoError("cannot open the tile set", path.string(),
+                  code ? code.message() : "there is no such folder", "Check the path.");
+  }
+  if (!fs::is_directory(folder, code)) {
+    throw IoError("cannot open the tile set", path.string(), "it is no folder",
+                  "Name the folder that holds layer.json.");
+  }
+  auto tile_set = std::make_unique<FolderTileSet>(folder);
+  if (tile_set->keys().empty() && !fs::exists(folder / "layer.json", code)) {
+    throw IoError("cannot open the tile set", path.string(),
+                  "there is neither a layer.json nor a tile in it",
+                  "Name the folder that holds layer.json.");
+  }
+  return tile_set;
+}
+
+Result<std::vector<std::uint8_t>> plain_tile_bytes(std::vector<std::uint8_t> stored) {
+  if (is_gzip(stored)) return gzip_decompress(stored, kLargestTileBytes);
+  if (stored.size() > kLargestTileBytes) {
+    return Error{fmt::format("the tile has {} bytes, more than the {} allowed", stored.size(),
+                             kLargestTileBytes)};
+  }
+  return stored;
+}
+
+}  // namespace qmpipe
