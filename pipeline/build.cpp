@@ -136,7 +136,7 @@ BuildReport empty_report(const BuildOptions& options, const BuildPlan& plan,
   report.expected_peak_bytes = memory.expected_peak_bytes;
   for (std::int32_t zoom = plan.recipe.min_zoom; zoom <= plan.recipe.max_zoom; ++zoom) {
     const auto at = static_cast<std::size_t>(zoom);
-    ZoomReport& row = report.zooms.emplace_back();
+    BuiltZoom& row = report.zooms.emplace_back();
     row.zoom = zoom;
     row.tolerance_m = plan.recipe.tolerance_m[at];
     row.height_step_m = plan.recipe.height_step_m[at];

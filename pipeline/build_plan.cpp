@@ -41,8 +41,12 @@ class RangeBound {
  public:
   RangeBound(const BuildOptions& options, const Survey& survey, std::int32_t zoom)
       : options_(options), scheme_(survey.scheme) {
-    for (const auto& pole : survey.pole_heights[static_cast<std::size_t>(zoom)]) {
-      if (pole) poles_m_.push_back(static_cast<double>(*pole));
+    // A pole without data here takes its height from a coarser zoom.
+    const std::int32_t coarsest = std::max(0, zoom - options.mesh.voids.pull_levels);
+    for (std::int32_t up = zoom; up >= coarsest; --up) {
+      for (const auto& pole : survey.pole_heights[static_cast<std::size_t>(up)]) {
+        if (pole) poles_m_.push_back(static_cast<double>(*pole));
+      }
     }
     for (const SurveyedTile& tile : survey.tiles[static_cast<std::size_t>(zoom)]) {
       tiles_.emplace(tile.key, &tile);

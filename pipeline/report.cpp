@@ -9,7 +9,7 @@
 namespace qmpipe {
 namespace {
 
-nlohmann::ordered_json zoom_object(const ZoomReport& zoom) {
+nlohmann::ordered_json zoom_object(const BuiltZoom& zoom) {
   nlohmann::ordered_json object = {{"zoom", zoom.zoom},
                                    {"tiles", zoom.tiles},
                                    {"vertices", zoom.vertices},
@@ -30,7 +30,7 @@ nlohmann::ordered_json zoom_object(const ZoomReport& zoom) {
 
 }  // namespace
 
-void ZoomReport::add(const TileWork& work) {
+void BuiltZoom::add(const TileWork& work) {
   ++tiles;
   vertices += static_cast<std::int64_t>(work.vertices);
   triangles += static_cast<std::int64_t>(work.triangles);
@@ -41,7 +41,7 @@ void ZoomReport::add(const TileWork& work) {
 }
 
 void BuildReport::add(const TileWork& work) {
-  const auto found = std::find_if(zooms.begin(), zooms.end(), [&work](const ZoomReport& zoom) {
+  const auto found = std::find_if(zooms.begin(), zooms.end(), [&work](const BuiltZoom& zoom) {
     return zoom.zoom == work.key.zoom;
   });
   QMPIPE_CHECK(found != zooms.end());
@@ -63,7 +63,7 @@ std::string write_report(const BuildReport& report) {
                                    {"expected_peak_bytes", report.expected_peak_bytes},
                                    {"peak_resident_bytes", report.peak_resident_bytes}};
   object["zooms"] = nlohmann::ordered_json::array();
-  for (const ZoomReport& zoom : report.zooms) object["zooms"].push_back(zoom_object(zoom));
+  for (const BuiltZoom& zoom : report.zooms) object["zooms"].push_back(zoom_object(zoom));
   return object.dump(2) + "\n";
 }
 
@@ -71,7 +71,7 @@ std::string report_table(const BuildReport& report) {
   std::string text = fmt::format("{:>4} {:>9} {:>9} {:>9} {:>12} {:>12} {:>12} {:>12}\n", "zoom",
                                  "tiles", "mean V", "mean T", "bytes", "tolerance m",
                                  "max error m", "RMS error m");
-  for (const ZoomReport& zoom : report.zooms) {
+  for (const BuiltZoom& zoom : report.zooms) {
     const auto tiles = static_cast<double>(std::max<std::int64_t>(1, zoom.tiles));
     text += fmt::format("{:>4} {:>9} {:>9.1f} {:>9.1f} {:>12} {:>12.3f} {:>12.3f} {:>12.3f}\n",
                         zoom.zoom, zoom.tiles, static_cast<double>(zoom.vertices) / tiles,

@@ -10,7 +10,7 @@
 
 namespace qmpipe {
 
-struct ZoomReport {
+struct BuiltZoom {
   std::int32_t zoom = 0;
   double tolerance_m = 0;
   double height_step_m = 0;
@@ -26,7 +26,7 @@ struct ZoomReport {
 };
 
 struct BuildReport {
-  std::vector<ZoomReport> zooms;
+  std::vector<BuiltZoom> zooms;
   std::int64_t tiles = 0;
   std::int64_t stored_bytes = 0;
   std::uint64_t content_hash = 0;  // the same for the same tiles in any order

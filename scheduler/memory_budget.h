@@ -13,7 +13,7 @@ struct MemoryNeeds {
   std::int32_t threads = 1;
   // What the lattice of all zooms takes at most.
   std::int64_t lattice_bytes = 0;
-  // The sources' largest block, which each thread needs a few of.
+  // The sources' largest block; GDAL's cache must hold a few.
   std::int64_t source_block_bytes = 0;
   // Per tile of the plan, for its keys, ranges and statistics.
   std::int64_t tiles = 0;

@@ -11,6 +11,8 @@ namespace qmpipe {
 namespace {
 
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+constexpr int kSphereSteps = 16;
+constexpr int kSphereFirstStep = 8;
 // Far enough never to be hidden, near enough for the client's float arithmetic.
 constexpr double kNeverHidden = 1e6;
 
@@ -37,14 +39,26 @@ SinCos sin_cos_deg(double angle_deg) {
   return {std::sin(angle_deg * kRadPerDeg), std::cos(angle_deg * kRadPerDeg)};
 }
 
-Sphere ritter_sphere(std::span<const Vec3> points) {
-  const auto farthest = [&points](const Vec3& from) {
-    return *std::max_element(points.begin(), points.end(), [&from](const Vec3& a, const Vec3& b) {
-      return length(minus(a, from)) < length(minus(b, from));
-    });
-  };
-  const Vec3 a = farthest(points.front());
-  const Vec3 b = farthest(a);
+const Vec3& farthest_from(const Vec3& centre, std::span<const Vec3> points) {
+  const Vec3* farthest = &points.front();
+  double largest = -1;
+  for (const Vec3& p : points) {
+    const Vec3 d = minus(p, centre);
+    const double squared = dot(d, d);
+    if (squared <= largest) continue;
+    largest = squared;
+    farthest = &p;
+  }
+  return *farthest;
+}
+
+double radius_around(const Vec3& centre, std::span<const Vec3> points) {
+  return length(minus(farthest_from(centre, points), centre));
+}
+
+Vec3 ritter_centre(std::span<const Vec3> points) {
+  const Vec3 a = farthest_from(points.front(), points);
+  const Vec3 b = farthest_from(a, points);
   Sphere sphere{.centre = scaled(plus(a, b), 0.5), .radius_m = length(minus(a, b)) / 2};
   for (const Vec3& p : points) {
     const double d = length(minus(p, sphere.centre));
@@ -53,10 +67,10 @@ Sphere ritter_sphere(std::span<const Vec3> points) {
     sphere.centre = plus(sphere.centre, scaled(minus(p, sphere.centre), (d - radius) / d));
     sphere.radius_m = radius;
   }
-  return sphere;
+  return sphere.centre;
 }
 
-Sphere box_sphere(std::span<const Vec3> points) {
+Vec3 box_centre(std::span<const Vec3> points) {
   Vec3 low = points.front();
   Vec3 high = points.front();
   for (const Vec3& p : points) {
@@ -65,7 +79,20 @@ Sphere box_sphere(std::span<const Vec3> points) {
       high[k] = std::max(high[k], p[k]);
     }
   }
-  return {.centre = scaled(plus(low, high), 0.5), .radius_m = 0};
+  return scaled(plus(low, high), 0.5);
+}
+
+// Steps towards the farthest point, shorter and shorter; keeps the best sphere on the way (Badoiu
+// and Clarkson, "Smaller core-sets for balls", 2003, begun from a good centre).
+Sphere improved_sphere(Vec3 centre, std::span<const Vec3> points) {
+  Sphere best{.centre = centre, .radius_m = std::numeric_limits<double>::infinity()};
+  for (int k = 0; k < kSphereSteps; ++k) {
+    const Vec3 to_farthest = minus(farthest_from(centre, points), centre);
+    const double radius_m = length(to_farthest);
+    if (radius_m < best.radius_m) best = {.centre = centre, .radius_m = radius_m};
+    centre = plus(centre, scaled(to_farthest, 1.0 / (k + kSphereFirstStep)));
+  }
+  return best;
 }
 
 }  // namespace
@@ -104,15 +131,13 @@ Vec3 to_ecef(const GeoPoint& point) {
 
 Sphere bounding_sphere(std::span<const Vec3> points_ecef) {
   QMPIPE_CHECK(!points_ecef.empty());
-  Sphere best = ritter_sphere(points_ecef);
-  Sphere box = box_sphere(points_ecef);
-  for (Sphere* sphere : {&best, &box}) {
-    // Measured again from the final centre, so that no rounding leaves a point outside.
-    double radius = 0;
-    for (const Vec3& p : points_ecef) radius = std::max(radius, length(minus(p, sphere->centre)));
-    sphere->radius_m = radius * (1 + 1e-12);
-  }
-  return box.radius_m < best.radius_m ? box : best;
+  const Vec3 ritter = ritter_centre(points_ecef);
+  const Vec3 box = box_centre(points_ecef);
+  const bool box_is_better = radius_around(box, points_ecef) < radius_around(ritter, points_ecef);
+  Sphere sphere = improved_sphere(box_is_better ? box : ritter, points_ecef);
+  // No rounding may leave a point outside.
+  sphere.radius_m *= 1 + 1e-12;
+  return sphere;
 }
 
 double occlusion_magnitude(const Vec3& unit_direction_scaled, const Vec3& point_ecef) {

@@ -53,8 +53,9 @@ WindowHeights Heightfield::window(std::int32_t zoom, const PostWindow& window) c
 
 void Heightfield::fill(const Lattice& lattice, const PostWindow& window, std::int32_t levels,
                        std::vector<float>& heights_m) const {
+  // First: a window without voids shows the same pole as one with them.
+  fill_pole_rows(lattice, window, levels, heights_m);
   if (!any_void(heights_m)) return;
-  fill_pole_rows(lattice, window, heights_m);
   const auto base_m = static_cast<float>(policy_.base_height_m);
   if (levels == 0) {
     std::replace_if(heights_m.begin(), heights_m.end(), [](float h) { return std::isnan(h); },
@@ -79,16 +80,22 @@ void Heightfield::fill(const Lattice& lattice, const PostWindow& window, std::in
   }
 }
 
+float Heightfield::pole_height_m(std::int32_t zoom, std::size_t pole, std::int32_t levels) const {
+  for (std::int32_t up = 0; up <= levels; ++up) {
+    const auto& height_m = pole_heights_.at(static_cast<std::size_t>(zoom - up))[pole];
+    if (height_m) return *height_m;
+  }
+  return static_cast<float>(policy_.base_height_m);
+}
+
+// The whole row takes one height, data or none: it is one point of the globe.
 void Heightfield::fill_pole_rows(const Lattice& lattice, const PostWindow& window,
-                                 std::vector<float>& heights_m) const {
+                                 std::int32_t levels, std::vector<float>& heights_m) const {
   for (const std::int32_t j : {0, lattice.rows() - 1}) {
     if (!lattice.is_pole_row(j) || j < window.j0 || j >= window.j0 + window.height_posts) continue;
-    const auto& pole = pole_heights_.at(static_cast<std::size_t>(lattice.zoom()))[j == 0 ? 0 : 1];
     const auto row = heights_m.begin() +
                      static_cast<std::ptrdiff_t>(position(window, window.i0, j));
-    // Without data at the pole the whole row takes the base height: it is one point of the globe.
-    std::fill(row, row + window.width_posts,
-              pole.value_or(static_cast<float>(policy_.base_height_m)));
+    std::fill(row, row + window.width_posts, pole_height_m(lattice.zoom(), j == 0 ? 0 : 1, levels));
   }
 }
 

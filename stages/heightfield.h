@@ -58,8 +58,9 @@ class Heightfield {
  private:
   void fill(const Lattice& lattice, const PostWindow& window, std::int32_t levels,
             std::vector<float>& heights_m) const;
-  void fill_pole_rows(const Lattice& lattice, const PostWindow& window,
+  void fill_pole_rows(const Lattice& lattice, const PostWindow& window, std::int32_t levels,
                       std::vector<float>& heights_m) const;
+  float pole_height_m(std::int32_t zoom, std::size_t pole, std::int32_t levels) const;
 
   const LatticeStore& store_;
   TilingScheme scheme_;

@@ -1,0 +1,143 @@
+#include "stages/normals.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "formats/oct_normal.h"
+#include "stages/geodesy.h"
+#include "tests/terrain_fixture.h"
+
+namespace qmpipe {
+namespace {
+
+using namespace testing;  // NOLINT(google-build-using-namespace): the fixture, in a test
+
+const TilingScheme kGeodetic(Projection::kGeodetic);
+const TilingScheme kMercator(Projection::kMercator);
+
+std::unique_ptr<LatticeStore> rough_store(std::uint64_t seed, const TilingScheme& scheme,
+                                          std::int32_t zoom) {
+  auto store = make_memory_lattice_store(scheme, zoom);
+  const Lattice lattice(scheme, zoom);
+  fill_zoom(*store, lattice, [&](std::int32_t i, std::int32_t j) {
+    return 40 * globe_height_m(seed, lattice, i, j);
+  });
+  return store;
+}
+
+std::vector<std::int32_t> posts_of_side(Side side) {
+  std::vector<std::int32_t> posts;
+  for (std::int32_t k = 0; k < kTilePosts; ++k) {
+    const Post p = side_post(side, k);
+    posts.push_back(tile_post_index(p.i, p.j));
+  }
+  return posts;
+}
+
+TEST(Normals, NeighboursWriteTheSameBytesAlongEveryBorder) {
+  for (const TilingScheme& scheme : {kGeodetic, kMercator}) {
+    for (std::int32_t zoom = 0; zoom <= 2; ++zoom) {
+      const auto store = rough_store(4, scheme, zoom);
+      const std::vector<PoleHeights> poles(3, PoleHeights{100.0F, 200.0F});
+      const Heightfield field(*store, scheme, {}, poles);
+      for (std::int32_t k = 0; k < scheme.columns(zoom) * scheme.rows(zoom); ++k) {
+        const TileKey here = {zoom, k % scheme.columns(zoom), k / scheme.columns(zoom)};
+        for (const Side side : {Side::kEast, Side::kNorth}) {
+          const auto there = scheme.neighbour(here, side);
+          if (!there) continue;
+          const auto ours = tile_normals(
+              scheme, here, field.window(zoom, Lattice::tile_window(here, 1)), posts_of_side(side));
+          const auto theirs =
+              tile_normals(scheme, *there, field.window(zoom, Lattice::tile_window(*there, 1)),
+                           posts_of_side(opposite(side)));
+          ASSERT_EQ(ours, theirs) << to_string(here) << " " << name_of(side);
+        }
+      }
+    }
+  }
+}
+
+// A plane of given slopes through a post, in the metres of its own east and north.
+WindowHeights tilted_plane(const Lattice& lattice, const Post& post, double slope_east,
+                           double slope_north) {
+  const double pi = std::acos(-1.0);
+  const double lat = lattice.latitude_deg(post.j) * pi / 180;
+  const double spacing = lattice.column_spacing_deg() * pi / 180;
+  const double e2 = 6.69437999014e-3;
+  const double w = 1 - e2 * std::sin(lat) * std::sin(lat);
+  const double east_m = 6378137.0 / std::sqrt(w) * std::cos(lat) * std::sin(spacing);
+  WindowHeights plane;
+  plane.window = {post.i - 1, post.j - 1, 3, 3};
+  plane.valid.assign(9, 1);
+  for (std::int32_t j = post.j - 1; j <= post.j + 1; ++j) {
+    for (std::int32_t i = post.i - 1; i <= post.i + 1; ++i) {
+      const double d_lat = lattice.latitude_deg(j) * pi / 180 - lat;
+      const double north_m = 6378137.0 * (1 - e2) / std::pow(w, 1.5) * d_lat;
+      plane.heights_m.push_back(
+          static_cast<float>(slope_east * east_m * (i - post.i) + slope_north * north_m));
+    }
+  }
+  return plane;
+}
+
+TEST(Normals, ATiltedPlaneHasItsSlopesInEastNorthUp) {
+  for (const TilingScheme& scheme : {kGeodetic, kMercator}) {
+    const Lattice lattice(scheme, 13);
+    for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+      SCOPED_TRACE("seed " + std::to_string(seed));
+      std::mt19937_64 random(seed);
+      const Post post = {
+          static_cast<std::int32_t>(random() % static_cast<std::uint64_t>(lattice.columns())),
+          lattice.rows() / 10 + static_cast<std::int32_t>(
+                                    random() % static_cast<std::uint64_t>(lattice.rows() * 4 / 5))};
+      const double east = static_cast<double>(random() % 401) / 100 - 2;
+      const double north = static_cast<double>(random() % 401) / 100 - 2;
+      const Vec3 normal = lattice_normal(lattice, tilted_plane(lattice, post, east, north), post);
+      const double lon_deg = lattice.longitude_deg(post.i);
+      const Vec3 up = up_at(lon_deg, lattice.latitude_deg(post.j));
+      const Vec3 to_east = up_at(lon_deg + 90, 0);
+      const Vec3 to_north = cross(up, to_east);
+      ASSERT_NEAR(length(normal), 1, 1e-12);
+      // 1e-6 and what the curve of a meridian or a row spacing in the mercator scheme adds.
+      const double bound = scheme.projection() == Projection::kGeodetic ? 1e-6 : 2e-5;
+      ASSERT_NEAR(-dot(normal, to_east) / dot(normal, up), east, bound);
+      ASSERT_NEAR(-dot(normal, to_north) / dot(normal, up), north, bound);
+    }
+  }
+}
+
+TEST(Normals, FlatGroundPointsUpAndPolesPointAlongTheAxis) {
+  const auto store = make_memory_lattice_store(kGeodetic, 1);
+  const Heightfield field(*store, kGeodetic, {}, std::vector<PoleHeights>(2));
+  const Lattice lattice(kGeodetic, 1);
+  for (const TileKey key : {TileKey{1, 0, 0}, TileKey{1, 3, 1}}) {
+    const WindowHeights heights = field.window(1, Lattice::tile_window(key, 1));
+    for (std::int32_t k = 0; k < kTilePosts; k += 16) {
+      const Post post = {key.x * 256 + k, key.y * 256 + (k * 7) % kTilePosts};
+      const Vec3 up = up_at(lattice.longitude_deg(post.i), lattice.latitude_deg(post.j));
+      ASSERT_GT(dot(lattice_normal(lattice, heights, post), up), 1 - 1e-9);
+      const std::int32_t pole = key.y == 0 ? 0 : lattice.rows() - 1;
+      ASSERT_EQ(lattice_normal(lattice, heights, {post.i, pole}),
+                (Vec3{0, 0, key.y == 0 ? -1.0 : 1.0}));
+    }
+  }
+}
+
+TEST(Normals, BytesAreTheEncodedLatticeNormalsInTheOrderAsked) {
+  const auto store = rough_store(8, kMercator, 1);
+  const Heightfield field(*store, kMercator, {}, {});
+  const TileKey key = {1, 1, 1};
+  const WindowHeights heights = field.window(1, Lattice::tile_window(key, 1));
+  const std::vector<std::int32_t> posts = {tile_post_index(256, 256), tile_post_index(3, 9),
+                                           tile_post_index(0, 128)};
+  const auto normals = tile_normals(kMercator, key, heights, posts);
+  ASSERT_EQ(normals.size(), posts.size());
+  for (std::size_t k = 0; k < posts.size(); ++k) {
+    const Post post = {256 + posts[k] % kTilePosts, 256 + posts[k] / kTilePosts};
+    EXPECT_EQ(normals[k], encode_oct_normal(lattice_normal(Lattice(kMercator, 1), heights, post)));
+  }
+}
+
+}  // namespace
+}  // namespace qmpipe
