@@ -1,0 +1,293 @@
+// The whole build on small rasters: the same bytes whatever the threads and the memory, nothing
+// wrong by `verify`, and a clear end when it cannot go on.
+#include "pipeline/build.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <random>
+
+#include "formats/errors.h"
+#include "formats/tile_set.h"
+#include "pipeline/verify.h"
+#include "tests/raster_fixture.h"
+#include "tests/temporary_folder.h"
+
+namespace qmpipe {
+namespace {
+
+using testing::RasterFixture;
+using testing::TemporaryFolder;
+
+// Hills of several sizes with a hole in the middle; `west_deg` may put it across the antimeridian.
+RasterFixture hilly_raster(std::uint32_t seed, double west_deg, double north_deg,
+                           double pixel_deg) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> phase(0, 2 * std::numbers::pi);
+  const double a = phase(random);
+  const double b = phase(random);
+  RasterFixture fixture;
+  fixture.width = 300;
+  fixture.height = 260;
+  fixture.geotransform = {{west_deg, pixel_deg, 0, north_deg, 0, -pixel_deg}};
+  fixture.void_value = -9999;
+  fixture.value = [a, b](int c, int r) {
+    if (std::hypot(c - 150, r - 130) < 40) return -9999.0;
+    return 900 * std::sin(c / 31.0 + a) * std::cos(r / 23.0 + b) +
+           120 * std::sin(c / 5.0 + b) * std::sin(r / 4.0 + a) + 400;
+  };
+  return fixture;
+}
+
+class BuildTest : public ::testing::Test {
+ protected:
+  std::string write(const RasterFixture& fixture, const std::string& name = "dem.tif") {
+    const std::string path = testing::file_in(folder_, name);
+    testing::write_raster(path, fixture);
+    return path;
+  }
+
+  BuildOptions options_for(const std::vector<std::string>& inputs, const std::string& out) {
+    BuildOptions options;
+    options.input.paths = inputs;
+    options.output.path = folder_.path() / out;
+    options.output.name = "test";
+    options.run.threads = 2;
+    return options;
+  }
+
+  static BuildResult run(const BuildOptions& options) {
+    Progress progress(ProgressStyle::kSilent, nullptr);
+    return build_pyramid(options, progress);
+  }
+
+  // Every file of a set but the report, which holds times.
+  static std::map<std::string, std::vector<std::uint8_t>> contents(const BuildOptions& options) {
+    std::map<std::string, std::vector<std::uint8_t>> files;
+    const auto set = open_tile_set(options.output.path);
+    for (const TileKey& key : set->keys()) files[to_string(key)] = *set->read(key);
+    const std::string layer = *set->layer_text();
+    files["layer.json"].assign(layer.begin(), layer.end());
+    return files;
+  }
+
+  static void expect_sound(const BuildOptions& options) {
+    Progress progress(ProgressStyle::kSilent, nullptr);
+    VerifyOptions check;
+    check.sources = options.input.paths;
+    const VerifyReport report =
+        verify(*open_tile_set(options.output.path), check, progress);
+    EXPECT_EQ(report.fault_count, 0) << text_of(report);
+    EXPECT_LT(report.largest_crack_m, 1e-3);
+    EXPECT_GT(report.tiles, 0);
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(BuildTest, BytesDoNotDependOnThreadsOrMemory) {
+  const std::string dem = write(hilly_raster(1, 178.6, 3.1, 0.01));
+  BuildOptions options = options_for({dem}, "reference");
+  options.run.threads = 1;
+  run(options);
+  const auto reference = contents(options);
+  ASSERT_GT(reference.size(), 20U);
+  struct Variant {
+    std::int32_t threads;
+    std::int64_t memory_bytes;
+  };
+  for (const Variant& variant : {Variant{2, 0}, Variant{8, 0}, Variant{80, 0},
+                                 Variant{1, 130LL << 20U}, Variant{8, 130LL << 20U}}) {
+    SCOPED_TRACE(std::to_string(variant.threads) + " threads, " +
+                 std::to_string(variant.memory_bytes) + " bytes");
+    BuildOptions other = options;
+    other.output.path = folder_.path() / "other";
+    other.output.overwrite = Overwrite::kYes;
+    other.run.threads = variant.threads;
+    other.run.memory_bytes = variant.memory_bytes;
+    run(other);
+    EXPECT_EQ(contents(other), reference);
+  }
+}
+
+TEST_F(BuildTest, VerifyFindsNothingInAnyScheme) {
+  std::uint32_t seed = 10;
+  for (const Projection projection : {Projection::kGeodetic, Projection::kMercator}) {
+    for (const Reduction reduction :
+         {Reduction::kMean, Reduction::kSubsample, Reduction::kMax, Reduction::kMin}) {
+      SCOPED_TRACE("seed " + std::to_string(++seed) + ", " + name_of(reduction));
+      const std::string dem = write(hilly_raster(seed, 178.6, 41.3, 0.01));
+      BuildOptions options = options_for({dem}, "tiles");
+      options.output.overwrite = Overwrite::kYes;
+      options.mesh.projection = projection;
+      options.mesh.reduction = reduction;
+      options.mesh.voids.kind =
+          seed % 2 == 0 ? VoidPolicy::Kind::kPull : VoidPolicy::Kind::kHeight;
+      run(options);
+      expect_sound(options);
+    }
+  }
+}
+
+TEST_F(BuildTest, WholeGlobeClosesAtThePolesAndTheAntimeridian) {
+  RasterFixture fixture;
+  fixture.width = 360;
+  fixture.height = 180;
+  fixture.geotransform = {{-180, 1, 0, 90, 0, -1}};
+  fixture.value = [](int c, int r) {
+    return 3000 * std::sin(c * std::numbers::pi / 60) * std::sin(r * std::numbers::pi / 45);
+  };
+  for (const Projection projection : {Projection::kGeodetic, Projection::kMercator}) {
+    BuildOptions options = options_for({write(fixture)}, "globe");
+    options.output.overwrite = Overwrite::kYes;
+    options.mesh.projection = projection;
+    options.mesh.max_zoom = 2;
+    const BuildResult result = run(options);
+    EXPECT_EQ(result.report.tiles, projection == Projection::kGeodetic ? 2 + 8 + 32 : 1 + 4 + 16);
+    expect_sound(options);
+  }
+}
+
+TEST_F(BuildTest, TolerancesOfSingleZoomsHold) {
+  const std::string dem = write(hilly_raster(3, 10, 45, 0.01));
+  BuildOptions options = options_for({dem}, "tiles");
+  options.mesh.tolerance_at_m = {{6, 40.0}, {7, 4.5}};
+  const BuildResult result = run(options);
+  expect_sound(options);
+  for (const BuiltZoom& zoom : result.report.zooms) {
+    EXPECT_LE(zoom.error.largest_m, zoom.tolerance_m) << "zoom " << zoom.zoom;
+    if (zoom.zoom == 7) {
+      EXPECT_EQ(zoom.tolerance_m, 4.5);
+    }
+  }
+}
+
+TEST_F(BuildTest, ReportAgreesWithVerify) {
+  const std::string dem = write(hilly_raster(4, 10, 45, 0.01));
+  BuildOptions options = options_for({dem}, "tiles");
+  const BuildResult built = run(options);
+  Progress progress(ProgressStyle::kSilent, nullptr);
+  VerifyOptions check;
+  check.sources = {dem};
+  const VerifyReport verified = verify(*open_tile_set(options.output.path), check, progress);
+  ASSERT_EQ(built.report.zooms.size(), verified.zooms.size());
+  for (std::size_t k = 0; k < verified.zooms.size(); ++k) {
+    EXPECT_EQ(built.report.zooms[k].tiles, verified.zooms[k].tiles);
+    EXPECT_EQ(built.report.zooms[k].vertices, verified.zooms[k].vertices);
+    EXPECT_EQ(built.report.zooms[k].triangles, verified.zooms[k].triangles);
+    EXPECT_EQ(built.report.zooms[k].stored_bytes, verified.zooms[k].stored_bytes);
+    EXPECT_DOUBLE_EQ(built.report.zooms[k].error.largest_m, verified.zooms[k].error.largest_m);
+    EXPECT_EQ(built.report.zooms[k].error.posts, verified.zooms[k].error.posts);
+  }
+}
+
+TEST_F(BuildTest, FirstValidInputWins) {
+  RasterFixture low = hilly_raster(5, 10, 45, 0.01);
+  low.value = [](int c, int) { return c < 150 ? 100.0 : -9999.0; };
+  RasterFixture high = low;
+  high.value = [](int, int) { return 700.0; };
+  const std::string first = write(low, "low.tif");
+  const std::string second = write(high, "high.tif");
+  BuildOptions options = options_for({first, second}, "both");
+  const BuildResult result = run(options);
+  expect_sound(options);
+  EXPECT_LE(result.report.zooms.back().error.largest_m, result.report.zooms.back().tolerance_m);
+}
+
+TEST_F(BuildTest, DryRunWritesNothing) {
+  BuildOptions options = options_for({write(hilly_raster(6, 10, 45, 0.01))}, "nothing");
+  options.run.dry_run = true;
+  const BuildResult result = run(options);
+  EXPECT_GT(result.estimate.tiles, 0);
+  EXPECT_GT(result.estimate.bytes, 0);
+  EXPECT_FALSE(std::filesystem::exists(options.output.path));
+}
+
+TEST_F(BuildTest, EstimateIsNearTheResult) {
+  BuildOptions options = options_for({write(hilly_raster(7, 10, 45, 0.01))}, "tiles");
+  const BuildResult result = run(options);
+  EXPECT_EQ(result.estimate.tiles, result.report.tiles);
+  EXPECT_GT(result.estimate.bytes, result.report.stored_bytes / 2);
+  EXPECT_LT(result.estimate.bytes, result.report.stored_bytes * 2);
+}
+
+TEST_F(BuildTest, TooLittleMemoryIsRefusedWithTheLeastThatWorks) {
+  BuildOptions options = options_for({write(hilly_raster(8, 10, 45, 0.01))}, "tiles");
+  options.run.memory_bytes = 1 << 20;
+  try {
+    run(options);
+    FAIL() << "a build in 1 MiB";
+  } catch (const UsageError& error) {
+    const std::string text = error.what();
+    const auto at = text.find("it needs ");
+    ASSERT_NE(at, std::string::npos) << text;
+    options.run.memory_bytes = std::stoll(text.substr(at + 9)) << 20U;
+  }
+  run(options);
+  expect_sound(options);
+}
+
+TEST_F(BuildTest, StopEndsWithoutLayerJson) {
+  BuildOptions options = options_for({write(hilly_raster(9, 10, 45, 0.01))}, "tiles");
+  std::atomic<bool> stop = true;
+  Progress progress(ProgressStyle::kSilent, &stop);
+  EXPECT_THROW(build_pyramid(options, progress), Interrupted);
+  EXPECT_FALSE(std::filesystem::exists(options.output.path / "layer.json"));
+}
+
+TEST_F(BuildTest, AllVoidInputIsAnErrorThatSaysSo) {
+  RasterFixture fixture = hilly_raster(11, 10, 45, 0.01);
+  for (const double value : {-9999.0, std::nan("")}) {
+    fixture.value = [value](int, int) { return value; };
+    BuildOptions options = options_for({write(fixture)}, "tiles");
+    options.output.overwrite = Overwrite::kYes;
+    try {
+      run(options);
+      FAIL() << "a build from nothing";
+    } catch (const IoError& error) {
+      EXPECT_NE(std::string(error.what()).find("no valid post"), std::string::npos);
+    }
+  }
+}
+
+TEST_F(BuildTest, OnePixelRasterGivesASoundSet) {
+  RasterFixture fixture;
+  fixture.width = 1;
+  fixture.height = 1;
+  fixture.geotransform = {{10, 0.5, 0, 45, 0, -0.5}};
+  fixture.value = [](int, int) { return 321.0; };
+  BuildOptions options = options_for({write(fixture)}, "tiles");
+  run(options);
+  expect_sound(options);
+}
+
+TEST_F(BuildTest, ContradictoryOptionsAreAllNamed) {
+  BuildOptions options = options_for({"none.tif"}, "tiles");
+  options.mesh.min_zoom = 5;
+  options.mesh.max_zoom = 3;
+  options.mesh.root_tolerance_m = -1;
+  options.mesh.initial_grid_cells = 1000;
+  options.encode.gzip_level = 99;
+  options.run.threads = 0;
+  EXPECT_EQ(violated_rules(options).size(), 5U);
+}
+
+TEST_F(BuildTest, RealDemsAreSound) {
+  int found = 0;
+  for (const std::string name : {"HI_topo_02.nc", "portland-ned-nodata.tif", "FR+IT.nc"}) {
+    const auto path = testing::real_data(name);
+    if (!path) continue;
+    ++found;
+    SCOPED_TRACE(name);
+    BuildOptions options = options_for({*path}, name);
+    run(options);
+    expect_sound(options);
+  }
+  if (found == 0) GTEST_SKIP() << "no real DEMs: set QMPIPE_DATA";
+}
+
+}  // namespace
+}  // namespace qmpipe

@@ -1,0 +1,234 @@
+#!/usr/bin/env python3
+"""The program as a person meets it: exit codes, messages, results on stdout, files.
+
+usage: cli_test.py QMPIPE
+"""
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+QMPIPE = None
+
+
+def run(*arguments, **options):
+    return subprocess.run([QMPIPE, *map(str, arguments)], capture_output=True, text=True,
+                          timeout=120, stdin=subprocess.DEVNULL, **options)
+
+
+class Cli(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory(prefix="qmpipe-cli-")
+        cls.root = pathlib.Path(cls.folder.name)
+        cls.dem = cls.root / "dem.tif"
+        done = run("synth", "-o", cls.dem, "--size", "400x300", "--bounds", "6,44,7,44.75",
+                   "--seed", 3)
+        assert done.returncode == 0, done.stderr
+        cls.tiles = cls.root / "tiles"
+        cls.built = run("build", cls.dem, "-o", cls.tiles)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def fails(self, code, *arguments, says=(), **options):
+        done = run(*arguments, **options)
+        self.assertEqual(done.returncode, code, done.stderr)
+        for text in says:
+            self.assertIn(text, done.stderr)
+        self.assertTrue(done.stderr.strip(), "no message")
+        return done
+
+    def test_help_names_every_command(self):
+        done = run("--help")
+        self.assertEqual(done.returncode, 0)
+        for command in ("build", "verify", "info", "synth"):
+            self.assertIn(command, done.stdout)
+
+    def test_each_command_has_help_with_an_example(self):
+        for command in ("build", "verify", "info", "synth"):
+            done = run(command, "--help")
+            self.assertEqual(done.returncode, 0)
+            self.assertIn("qmpipe " + command, done.stdout)
+            self.assertIn("xample", done.stdout)
+
+    def test_version(self):
+        self.assertRegex(run("--version").stdout, r"^qmpipe \d+\.\d+\.\d+\n$")
+
+    def test_build_reports_on_stdout(self):
+        self.assertEqual(self.built.returncode, 0, self.built.stderr)
+        self.assertIn("max error m", self.built.stdout)
+        self.assertRegex(self.built.stdout, r"built: \d+ tiles")
+
+    def test_silent_run_has_no_carriage_returns(self):
+        self.assertNotIn("\r", self.built.stderr)
+
+    def test_verify_of_own_set_finds_nothing(self):
+        done = run("verify", self.tiles, "--source", self.dem)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("0 faults", done.stdout)
+
+    def test_verify_finds_damage(self):
+        copy = self.root / "damaged"
+        run("build", self.dem, "-o", copy, "--overwrite")
+        deepest = max((p for p in copy.glob("*/*/*.terrain")), key=lambda p: int(p.parts[-3]))
+        deepest.write_bytes(deepest.read_bytes()[:100])
+        done = run("verify", copy, "--json")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        key = "/".join(deepest.with_suffix("").parts[-3:])
+        self.assertIn(key, done.stdout)
+        json.loads(done.stdout)
+
+    def test_info_of_set_and_tile(self):
+        done = run("info", self.tiles, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        json.loads(done.stdout)
+        tile = max(self.tiles.glob("*/*/*.terrain"), key=lambda p: p.stat().st_size)
+        done = run("info", tile)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for name in ("tile.ply", "tile.obj", "tile.glb"):
+            done = run("info", tile, "--mesh", self.root / name)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertGreater((self.root / name).stat().st_size, 500)
+
+    def test_json_run_is_json_throughout(self):
+        done = run("build", self.dem, "-o", self.root / "json", "--json", "--overwrite")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        events = [json.loads(line)["event"] for line in done.stderr.splitlines()]
+        self.assertIn("estimate", events)
+        self.assertIn("phase_done", events)
+        report = json.loads(done.stdout)
+        self.assertEqual(report["tiles"], sum(zoom["tiles"] for zoom in report["zooms"]))
+        on_disk = json.loads((self.root / "json" / "report.json").read_text())
+        self.assertEqual(on_disk["tiles"], report["tiles"])
+
+    def test_dry_run_prints_the_estimate_and_writes_nothing(self):
+        out = self.root / "dry"
+        done = run("build", self.dem, "-o", out, "--dry-run")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stdout, r"estimate: \d+ tiles")
+        self.assertFalse(out.exists())
+
+    def test_existing_output_is_refused_with_the_remedy(self):
+        self.fails(1, "build", self.dem, "-o", self.tiles, says=["--overwrite"])
+
+    def test_overwrite_leaves_other_files_alone(self):
+        out = self.root / "shared-folder"
+        run("build", self.dem, "-o", out)
+        (out / "notes.txt").write_text("mine")
+        done = run("build", self.dem, "-o", out, "--overwrite")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual((out / "notes.txt").read_text(), "mine")
+
+    def test_usage_errors_exit_2(self):
+        out = self.root / "usage"
+        self.fails(2, "build", "-o", out)
+        self.fails(2)
+        self.fails(2, "bild")
+        self.fails(2, "build", self.dem, "-o", out, "--threads", "0", says=["--threads"])
+        self.fails(2, "build", self.dem, "-o", out, "--tolerance", "0", says=["--tolerance"])
+        self.fails(2, "build", self.dem, "-o", out, "--tolerance", "soft")
+        self.fails(2, "build", self.dem, "-o", out, "--gzip", "13", says=["none"])
+        self.fails(2, "build", self.dem, "-o", out, "--nodata", "zero", says=["pull"])
+        self.fails(2, "build", self.dem, "-o", out, "--memory", "lots", says=["512M"])
+        self.fails(2, "build", self.dem, "-o", out, "--memory", "1M", says=["MiB or more"])
+        self.fails(2, "build", self.dem, "-o", out, "--tolerance-at", "9:3", says=["9=20"])
+        self.fails(2, "build", self.dem, "-o", out, "--min-zoom", "5", "--max-zoom", "2",
+                   says=["--max-zoom"])
+        self.fails(2, "build", self.dem, "-o", out, "--max-zoom", "99")
+        self.fails(2, "synth", "-o", self.root / "x.tif", "--size", "12", "--bounds", "0,0,1,1")
+        self.assertFalse(out.exists())
+
+    def test_missing_input_is_named(self):
+        self.fails(1, "build", self.root / "nowhere.tif", "-o", self.root / "a",
+                   says=["nowhere.tif"])
+
+    def test_truncated_input_is_named(self):
+        cut = self.root / "cut.tif"
+        cut.write_bytes(self.dem.read_bytes()[:self.dem.stat().st_size // 2])
+        done = self.fails(1, "build", cut, "-o", self.root / "b", says=["cut.tif"])
+        self.assertFalse((self.root / "b" / "layer.json").exists(), done.stdout)
+
+    def test_input_that_is_no_raster_is_named(self):
+        text = self.root / "text.tif"
+        text.write_text("no raster at all")
+        self.fails(1, "build", text, "-o", self.root / "c", says=["text.tif"])
+
+    def test_input_without_crs_says_how_to_give_one(self):
+        bare = self.root / "bare.asc"
+        rows = "\n".join(" ".join(str(100 + 7 * c + r) for c in range(20)) for r in range(20))
+        bare.write_text("ncols 20\nnrows 20\nxllcorner 400000\nyllcorner 5000000\n"
+                        "cellsize 1000\nNODATA_value -9999\n" + rows + "\n")
+        self.fails(1, "build", bare, "-o", self.root / "d", says=["coordinate reference system", "--source-crs"])
+        done = run("build", bare, "-o", self.root / "d2", "--source-crs", "EPSG:32632",
+                   "--max-zoom", "4")
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_unwritable_output_is_named(self):
+        blocked = self.root / "a-file"
+        blocked.write_text("not a folder")
+        self.fails(1, "build", self.dem, "-o", blocked / "tiles", says=["a-file"])
+
+    def test_full_disk_ends_with_a_remedy(self):
+        if os.geteuid() != 0:
+            self.skipTest("needs root to mount a small disk")
+        small = self.root / "small"
+        small.mkdir()
+        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(small)],
+                                 capture_output=True, check=False)
+        if mounted.returncode != 0:
+            self.skipTest("cannot mount here: " + mounted.stderr.decode().strip())
+        try:
+            self.fails(1, "build", self.dem, "-o", small / "tiles", "--gzip", "none",
+                       says=["space"])
+            self.assertFalse((small / "tiles" / "layer.json").exists())
+        finally:
+            subprocess.run(["umount", str(small)], check=False)
+
+    def test_interrupt_exits_130_and_leaves_no_finished_set(self):
+        big = self.root / "big.tif"
+        done = run("synth", "-o", big, "--size", "2400x1800", "--bounds", "6,43.5,8,45",
+                   "--seed", 7)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        out = self.root / "interrupted"
+        process = subprocess.Popen([QMPIPE, "build", str(big), "-o", str(out), "--tolerance",
+                                    "1500"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   text=True)
+        deadline = time.monotonic() + 60
+        while not list(out.glob("*/*/*.terrain")) and time.monotonic() < deadline:
+            self.assertIsNone(process.poll(), "ended before it could be interrupted")
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        _, stderr = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130, stderr)
+        self.assertRegex(stderr, r"stopped after \d+ of \d+ tiles")
+        self.assertFalse((out / "layer.json").exists())
+
+    def test_verify_of_nothing_is_an_error(self):
+        self.fails(1, "verify", self.root / "nothing-here", says=["nothing-here"])
+
+    def test_synth_is_a_pure_function_of_the_seed(self):
+        names = []
+        for name, seed in (("s1", 5), ("s2", 5), ("s3", 6)):
+            path = self.root / (name + ".tif")
+            run("synth", "-o", path, "--size", "200x150", "--bounds", "0,0,1,1", "--seed", seed)
+            names.append(path.read_bytes())
+        self.assertEqual(names[0], names[1])
+        self.assertNotEqual(names[0], names[2])
+
+    def test_verbose_prints_every_effective_option(self):
+        done = run("build", self.dem, "-o", self.root / "v", "--dry-run", "-v")
+        for word in ("tolerance", "resampling", "reduce", "nodata", "gzip", "threads", "memory"):
+            self.assertTrue(re.search(r"^  " + word, done.stderr, re.M), word)
+
+
+if __name__ == "__main__":
+    QMPIPE = sys.argv.pop(1)
+    unittest.main(verbosity=2)
