@@ -53,17 +53,33 @@ struct RasterInfo {
   // The raster's extent. east_deg - west_deg <= 360; east_deg may exceed 180 when the raster
   // crosses the antimeridian (then west_deg is in [-180, 180]).
   RectangleDeg bounds_deg;
-  // True when the columns go once round the globe, so that the last pixel's eastern neighbour is
-  // the first.
+  // True when the columns go once round the globe (to a hundredth of a pixel), so that the last
+  // pixel's eastern neighbour is the first.
   bool wraps_columns = false;
+  // True when the raster is in degrees of WGS84 and not rotated: then the pixel's column depends on
+  // the longitude alone and its row on the latitude alone.
+  bool is_separable = false;
+  // How longitude and latitude become the raster's CRS, in PROJ's words.
+  std::string transformation;
+  // What the file leaves open and was assumed, as sentences without a full stop ("the file names no
+  // CRS; ..."); the program tells the user.
+  std::vector<std::string> assumptions;
+};
+
+struct OpenOptions {
+  // Taken instead of the file's CRS; anything GDAL understands (EPSG:n, WKT, PROJ, a .prj file).
+  // DEFAULT: empty, the file's own.
+  std::string crs_override;
 };
 
 class RasterSource {
  public:
   // `path` may be anything GDAL opens (a file, a .zip with one raster inside, /vsi..., a subdataset
-  // name). Throws IoError with the remedy: missing file, no driver, no CRS, no geotransform, rotated
-  // CRS that cannot be inverted, no band, complex type.
-  static std::unique_ptr<RasterSource> open(const std::string& path);
+  // name); the first band is read. Throws IoError with the remedy: missing file, no driver, no CRS,
+  // no geotransform or one that cannot be inverted, CRS not tied to the globe, no band, complex
+  // type; UsageError when the CRS override is no CRS.
+  static std::unique_ptr<RasterSource> open(const std::string& path,
+                                            const OpenOptions& options = {});
   ~RasterSource();
   RasterSource(const RasterSource&) = delete;
   RasterSource& operator=(const RasterSource&) = delete;
@@ -71,8 +87,8 @@ class RasterSource {
   const RasterInfo& info() const;
 
   // Where a point of the globe (WGS84) lies on the raster, exactly transformed; may lie outside the
-  // raster. For rasters in degrees the longitude is moved by multiples of 360 into the raster's
-  // range where that is possible. None where the CRS does not reach the point.
+  // raster. For rasters in degrees the longitude is first moved by multiples of 360 to within 180
+  // of the raster's middle. None where the CRS does not reach the point.
   std::optional<PixelPoint> pixel_at(double longitude_deg, double latitude_deg) const;
 
   // Reads a window that lies inside the raster, row by row from the top, voids as NaN.

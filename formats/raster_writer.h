@@ -15,9 +15,9 @@ namespace qmpipe {
 struct RasterWriterOptions {
   std::int64_t width = 0;
   std::int64_t height = 0;
-  RectangleDeg bounds_deg;            // outer edges of the outermost pixels, EPSG:4326
-  std::int16_t void_value = -32768;   // declared as nodata
-  std::int32_t block_posts = 256;     // tile width and height in the file
+  RectangleDeg bounds_deg;           // outer edges of the outermost pixels, EPSG:4326
+  std::int16_t void_value = -32768;  // declared as nodata
+  std::int32_t block_posts = 256;    // tile width and height in the file
 };
 
 class RasterWriter {

@@ -1,11 +1,13 @@
 // Heights at posts, read from rasters: the first step of a run.
 //
-// Guarantees: a post's height is a pure function of the post, the sources and the resampling (DESIGN
-// 5.1): it does not depend on the window it was asked in, on the thread or on what was asked before.
-// Sources are taken in the order given: the first that is valid at a post wins. Voids are NaN.
-// A post lies on a raster when it lies within the outer edges of its pixels; it is void where the
-// pixel that contains it is void. Interpolation uses the valid neighbours only.
-// A Sampler is used by one thread at a time.
+// Guarantees: a post's height is a pure function of the post, the sources and the resampling
+// (DESIGN 5.1): it does not depend on the window it was asked in, on the thread or on what was
+// asked before. Sources are taken in the order given: the first that is valid at a post wins. Voids
+// are NaN. A post lies on a raster when it lies within the outer edges of its pixels; it is void
+// where the pixel that contains it is void. Interpolation uses the valid neighbours only; beyond
+// the centres of the outermost pixels it repeats them (or goes on round the globe). Places on the
+// raster are exact to 0.01 pixel (post_positions.h). All posts of a pole row have one height, the
+// mean of 64 of them. A Sampler is used by one thread at a time.
 #pragma once
 
 #include <memory>
@@ -15,10 +17,9 @@
 
 #include "formats/raster_source.h"
 #include "scheduler/lattice.h"
+#include "stages/resampling.h"
 
 namespace qmpipe {
-
-enum class Resampling { kBilinear, kCubic, kNearest };
 
 class Sampler {
  public:
@@ -39,7 +40,8 @@ class Sampler {
   std::unique_ptr<Impl> impl_;
 };
 
-// The coarsest zoom whose post spacing is no larger than the finest source pixel.
+// The coarsest zoom whose post spacing (at the equator) is no larger than the finest source pixel,
+// to a millionth; at most kMaxZoom.
 std::int32_t sampling_zoom_for(const TilingScheme& scheme, std::span<const RasterInfo> sources);
 
 }  // namespace qmpipe

@@ -1,0 +1,33 @@
+// Finding out which CRS a raster is in: from the user, the file, a .prj file beside it, or (NetCDF
+// with longitude and latitude axes) from the names of its axes. For formats/ only.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/crs_transform.h"
+
+class GDALDataset;
+
+namespace qmpipe {
+
+struct RasterCrs {
+  CrsText text;  // horizontal part only
+  std::string name;
+  bool is_geographic = false;
+  double turn = 360;  // once round the globe in the unit of a geographic CRS
+  bool has_vertical_datum = false;
+  // Of a compound CRS's heights; empty when the CRS says nothing about heights.
+  std::string vertical_unit;
+  double vertical_metres_per_unit = 1;
+  // What had to be assumed, as sentences without a full stop.
+  std::vector<std::string> assumptions;
+};
+
+// `path` is what the user named, `opened` what GDAL opened in the end; `override_text` (anything
+// GDAL understands as a CRS) may be empty. Throws IoError when there is no CRS, UsageError when the
+// override is not a CRS.
+RasterCrs crs_of(GDALDataset& dataset, const std::string& path, const std::string& opened,
+                 const std::string& override_text);
+
+}  // namespace qmpipe

@@ -1,0 +1,273 @@
+#include "stages/sampling.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "scheduler/check.h"
+#include "stages/post_positions.h"
+
+namespace qmpipe {
+namespace {
+
+constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
+// Bounds of what one read may ask for, and of the positions held at a time; results do not depend
+// on either.
+constexpr std::int64_t kLargestReadPixels = 4'000'000;
+constexpr std::int32_t kLargestBlockPosts = 512;
+constexpr std::int32_t kPolePosts = 64;
+
+// Part of the block of posts in hand, and where its posts are in the caller's rows.
+struct Part {
+  std::size_t column = 0;
+  std::size_t row = 0;
+  std::size_t width = 0;
+  std::size_t height = 0;
+};
+
+// Posts whose columns do not leave the lattice, and the caller's values for them.
+struct Strip {
+  PostWindow posts;
+  std::span<float> out;  // from the strip's first post to its last, in the caller's rows
+  std::size_t stride = 0;
+
+  std::span<float> row(std::size_t r, std::size_t column, std::size_t width) const {
+    return out.subspan(r * stride + column, width);
+  }
+};
+
+}  // namespace
+
+struct Sampler::Impl {
+  std::vector<std::unique_ptr<RasterSource>> sources;
+  Resampling resampling = Resampling::kBilinear;
+  // Buffers kept between calls.
+  std::vector<PixelPoint> places;
+  std::vector<double> pixels;
+  std::vector<double> read_buffer;
+  // By zoom and row. A value is a pure function of both.
+  std::map<std::pair<std::int32_t, std::int32_t>, float> pole_heights_m;
+
+  void sample_strip(const Lattice& lattice, const Strip& strip);
+  void sample_block(const RasterSource& source, const Lattice& lattice, const Strip& block);
+  void sample_part(const RasterSource& source, const Strip& block, const Part& part);
+  void fetch(const RasterSource& source, const PixelWindow& needed);
+  void read_piece(const RasterSource& source, const PixelWindow& piece, double* out,
+                  std::int64_t stride);
+  float pole_height_m(const Lattice& lattice, std::int32_t j);
+};
+
+void Sampler::Impl::read_piece(const RasterSource& source, const PixelWindow& piece, double* out,
+                               std::int64_t stride) {
+  if (piece.width == stride) {
+    source.read(piece, {out, piece.size()});
+    return;
+  }
+  read_buffer.resize(piece.size());
+  source.read(piece, read_buffer);
+  for (std::int64_t r = 0; r < piece.height; ++r) {
+    std::copy_n(read_buffer.data() + r * piece.width, piece.width, out + r * stride);
+  }
+}
+
+// The needed window as if the raster went on beyond its edges.
+void Sampler::Impl::fetch(const RasterSource& source, const PixelWindow& needed) {
+  const RasterInfo& info = source.info();
+  pixels.resize(needed.size());
+  const std::int64_t row0 = std::clamp<std::int64_t>(needed.row0, 0, info.height - 1);
+  const std::int64_t row1 =
+      std::clamp<std::int64_t>(needed.row0 + needed.height - 1, 0, info.height - 1);
+  double* const first = pixels.data() + (row0 - needed.row0) * needed.width;
+  std::int64_t done = 0;
+  while (done < needed.width) {
+    const std::int64_t wanted = needed.column0 + done;
+    PixelWindow piece{.row0 = row0, .height = row1 - row0 + 1};
+    const std::int64_t left = needed.width - done;
+    if (info.wraps_columns) {
+      piece.column0 = ((wanted % info.width) + info.width) % info.width;
+      piece.width = std::min(left, info.width - piece.column0);
+    } else {
+      piece.column0 = std::clamp<std::int64_t>(wanted, 0, info.width - 1);
+      // Outside the raster: its outermost pixel, one column at a time.
+      piece.width = wanted == piece.column0 ? std::min(left, info.width - wanted) : 1;
+    }
+    read_piece(source, piece, first + done, needed.width);
+    done += piece.width;
+  }
+  const auto row_at = [&](std::int64_t row) {
+    return pixels.begin() + (row - needed.row0) * needed.width;
+  };
+  for (std::int64_t row = needed.row0; row < row0; ++row) {
+    std::copy_n(row_at(row0), needed.width, row_at(row));
+  }
+  for (std::int64_t row = row1 + 1; row < needed.row0 + needed.height; ++row) {
+    std::copy_n(row_at(row1), needed.width, row_at(row));
+  }
+}
+
+void Sampler::Impl::sample_part(const RasterSource& source, const Strip& block, const Part& part) {
+  const RasterInfo& info = source.info();
+  const RasterShape shape{
+      .width = info.width, .height = info.height, .wraps_columns = info.wraps_columns};
+  const auto places_of_row = [&](std::size_t r) {
+    const auto width = static_cast<std::size_t>(block.posts.width_posts);
+    return std::span<const PixelPoint>(places).subspan((part.row + r) * width + part.column,
+                                                       part.width);
+  };
+  PlaceBounds bounds(shape);
+  for (std::size_t r = 0; r < part.height; ++r) bounds.add(places_of_row(r));
+  const std::optional<NeededPixels> needed = bounds.needed(resampling);
+  if (!needed) return;
+  const bool is_single = part.width == 1 && part.height == 1;
+  if (needed->window.width * needed->window.height > kLargestReadPixels && !is_single) {
+    Part first = part;
+    Part second = part;
+    if (part.width >= part.height) {
+      first.width = part.width / 2;
+      second.column += first.width;
+      second.width -= first.width;
+    } else {
+      first.height = part.height / 2;
+      second.row += first.height;
+      second.height -= first.height;
+    }
+    sample_part(source, block, first);
+    sample_part(source, block, second);
+    return;
+  }
+  fetch(source, needed->window);
+  for (std::size_t r = 0; r < part.height; ++r) {
+    resample(resampling, shape, {.needed = *needed, .heights_m = pixels}, places_of_row(r),
+             block.row(part.row + r, part.column, part.width));
+  }
+}
+
+void Sampler::Impl::sample_block(const RasterSource& source, const Lattice& lattice,
+                                 const Strip& block) {
+  const auto width = static_cast<std::size_t>(block.posts.width_posts);
+  const auto height = static_cast<std::size_t>(block.posts.height_posts);
+  bool is_full = true;
+  for (std::size_t r = 0; r < height && is_full; ++r) {
+    const std::span<const float> row = block.row(r, 0, width);
+    is_full = std::none_of(row.begin(), row.end(), [](float h) { return std::isnan(h); });
+  }
+  if (is_full) return;
+  places.resize(block.posts.size());
+  locate_posts(source, lattice, block.posts, places);
+  for (std::size_t r = 0; r < height; ++r) {
+    const std::span<const float> row = block.row(r, 0, width);
+    for (std::size_t k = 0; k < width; ++k) {
+      // An earlier source has this post already.
+      if (!std::isnan(row[k]))
+        places[r * width + k].column = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+  sample_part(source, block, {.width = width, .height = height});
+}
+
+void Sampler::Impl::sample_strip(const Lattice& lattice, const Strip& strip) {
+  const PostWindow& all = strip.posts;
+  for (std::int32_t r = 0; r < all.height_posts; r += kLargestBlockPosts) {
+    for (std::int32_t c = 0; c < all.width_posts; c += kLargestBlockPosts) {
+      const PostWindow posts{.i0 = all.i0 + c,
+                             .j0 = all.j0 + r,
+                             .width_posts = std::min(kLargestBlockPosts, all.width_posts - c),
+                             .height_posts = std::min(kLargestBlockPosts, all.height_posts - r)};
+      const std::size_t start =
+          static_cast<std::size_t>(r) * strip.stride + static_cast<std::size_t>(c);
+      const Strip block{.posts = posts, .out = strip.out.subspan(start), .stride = strip.stride};
+      const PostRange range{.i0 = posts.i0,
+                            .j0 = posts.j0,
+                            .i1 = posts.i0 + posts.width_posts - 1,
+                            .j1 = posts.j0 + posts.height_posts - 1};
+      for (const std::unique_ptr<RasterSource>& source : sources) {
+        if (touches_bounds(source->info(), lattice, range)) sample_block(*source, lattice, block);
+      }
+    }
+  }
+}
+
+float Sampler::Impl::pole_height_m(const Lattice& lattice, std::int32_t j) {
+  const std::pair<std::int32_t, std::int32_t> key(lattice.zoom(), j);
+  if (const auto known = pole_heights_m.find(key); known != pole_heights_m.end()) {
+    return known->second;
+  }
+  double sum = 0;
+  int count = 0;
+  for (std::int32_t k = 0; k < kPolePosts; ++k) {
+    std::array<float, 1> height = {kVoid};
+    const PostWindow post{
+        .i0 = k * (lattice.columns() / kPolePosts), .j0 = j, .width_posts = 1, .height_posts = 1};
+    sample_strip(lattice, {.posts = post, .out = height, .stride = 1});
+    if (std::isnan(height[0])) continue;
+    sum += static_cast<double>(height[0]);
+    ++count;
+  }
+  const float mean = count == 0 ? kVoid : static_cast<float>(sum / count);
+  pole_heights_m.emplace(key, mean);
+  return mean;
+}
+
+Sampler::Sampler(std::vector<std::unique_ptr<RasterSource>> sources, Resampling resampling)
+    : impl_(std::make_unique<Impl>()) {
+  QMPIPE_CHECK(!sources.empty());
+  impl_->sources = std::move(sources);
+  impl_->resampling = resampling;
+}
+
+Sampler::~Sampler() = default;
+Sampler::Sampler(Sampler&&) noexcept = default;
+
+void Sampler::sample(const Lattice& lattice, const PostWindow& window, std::span<float> out) {
+  QMPIPE_CHECK(out.size() == window.size());
+  std::fill(out.begin(), out.end(), kVoid);
+  const std::int32_t j0 = std::max(window.j0, 0);
+  const std::int32_t j1 = std::min(window.j0 + window.height_posts, lattice.rows());
+  if (j0 >= j1) return;
+  const auto stride = static_cast<std::size_t>(window.width_posts);
+  const auto row_of = [&](std::int32_t j) {
+    return out.subspan(static_cast<std::size_t>(j - window.j0) * stride);
+  };
+  // Cut where the columns wrap, so that a post is asked for under one name only.
+  for (std::int32_t c = 0; c < window.width_posts;) {
+    const std::int32_t i = lattice.wrap_column(window.i0 + c);
+    const std::int32_t width = std::min(window.width_posts - c, lattice.columns() - i);
+    const PostWindow posts{.i0 = i, .j0 = j0, .width_posts = width, .height_posts = j1 - j0};
+    impl_->sample_strip(
+        lattice,
+        {.posts = posts, .out = row_of(j0).subspan(static_cast<std::size_t>(c)), .stride = stride});
+    c += width;
+  }
+  for (const std::int32_t j : {0, lattice.rows() - 1}) {
+    if (!lattice.is_pole_row(j) || j < j0 || j >= j1) continue;
+    const std::span<float> row = row_of(j).first(stride);
+    std::fill(row.begin(), row.end(), impl_->pole_height_m(lattice, j));
+  }
+}
+
+bool Sampler::may_cover(const Lattice& lattice, const PostWindow& window) const {
+  const PostRange range{.i0 = window.i0,
+                        .j0 = std::max(window.j0, 0),
+                        .i1 = window.i0 + window.width_posts - 1,
+                        .j1 = std::min(window.j0 + window.height_posts, lattice.rows()) - 1};
+  if (range.j0 > range.j1) return false;
+  return std::any_of(impl_->sources.begin(), impl_->sources.end(), [&](const auto& source) {
+    return touches_bounds(source->info(), lattice, range);
+  });
+}
+
+std::int32_t sampling_zoom_for(const TilingScheme& scheme, std::span<const RasterInfo> sources) {
+  constexpr double kSlack = 1e-6;
+  double finest_deg = 360;
+  for (const RasterInfo& info : sources) finest_deg = std::min(finest_deg, info.pixel_deg);
+  for (std::int32_t zoom = 0; zoom < kMaxZoom; ++zoom) {
+    if (Lattice(scheme, zoom).column_spacing_deg() <= finest_deg * (1 + kSlack)) return zoom;
+  }
+  return kMaxZoom;
+}
+
+}  // namespace qmpipe

@@ -1,0 +1,51 @@
+// Small rasters written for a test, and the places where tests find data.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/raster_source.h"
+#include "tests/temporary_folder.h"
+
+namespace qmpipe::testing {
+
+std::string file_in(const TemporaryFolder& folder, const std::string& name);
+
+enum class PixelIs { kArea, kPoint };
+
+struct RasterFixture {
+  int width = 4;
+  int height = 3;
+  std::optional<std::array<double, 6>> geotransform = {{10, 1, 0, 50, 0, -1}};
+  std::string crs = "EPSG:4326";  // empty: none
+  std::string type = "Float32";   // GDAL's name
+  std::optional<double> void_value = {};
+  double scale = 1;
+  double offset = 0;
+  std::string unit = {};
+  PixelIs pixel_is = PixelIs::kArea;
+  std::vector<std::string> creation_options = {};
+  // Raw value of pixel (column, row). DEFAULT: 10 row + column.
+  std::function<double(int, int)> value = [](int c, int r) { return 10.0 * r + c; };
+  // Per-dataset mask, one for each pixel, 0 void; empty: none.
+  std::vector<std::uint8_t> mask = {};
+};
+
+// Adds a file to a zip archive, which is made where it is missing. Throws std::runtime_error.
+void add_to_zip(const std::string& archive, const std::string& file);
+
+// Writes a GeoTIFF. Throws std::runtime_error.
+void write_raster(const std::string& path, const RasterFixture& fixture);
+
+std::unique_ptr<RasterSource> open_fixture(const std::string& path, const RasterFixture& fixture);
+std::vector<double> read_all(const RasterSource& source);
+
+// A real DEM, or nothing where the data is absent (QMPIPE_DATA, else ../shared/data).
+std::optional<std::string> real_data(const std::string& name);
+
+}  // namespace qmpipe::testing
