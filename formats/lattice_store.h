@@ -33,7 +33,6 @@ class LatticeStore {
 };
 
 // Keeps everything in memory; blocks without a valid post take no room.
-std::unique_ptr<LatticeStore> make_memory_lattice_store(TilingScheme scheme,
-                                                        std::int32_t max_zoom);
+std::unique_ptr<LatticeStore> make_memory_lattice_store(TilingScheme scheme, std::int32_t max_zoom);
 
 }  // namespace qmpipe

@@ -40,8 +40,7 @@ class MemoryLatticeStore final : public LatticeStore {
     return find({.zoom = zoom, .x = bx, .y = by}) != nullptr;
   }
 
-  void read(const Lattice& lattice, const PostWindow& window,
-            std::span<float> out) const override {
+  void read(const Lattice& lattice, const PostWindow& window, std::span<float> out) const override {
     QMPIPE_CHECK(out.size() == window.size());
     std::fill(out.begin(), out.end(), kVoid);
     const std::int32_t j_first = std::max(window.j0, 0);

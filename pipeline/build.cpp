@@ -87,7 +87,8 @@ void require_data(const Survey& survey) {
   for (const RasterInfo& source : survey.sources) {
     names += (names.empty() ? "" : ", ") + source.path;
   }
-  throw IoError("no valid post in", names, "every pixel is void or the rasters lie between the posts",
+  throw IoError("no valid post in", names,
+                "every pixel is void or the rasters lie between the posts",
                 "check the declared void value with gdalinfo -stats");
 }
 
@@ -112,8 +113,8 @@ RectangleDeg united_bounds(const std::vector<RasterInfo>& sources) {
 LayerJson layer_for(const BuildOptions& options, const Survey& survey, const BuildPlan& plan,
                     const BuildReport& report) {
   LayerJson layer;
-  layer.name = options.output.name.empty() ? options.output.path.filename().string()
-                                           : options.output.name;
+  layer.name =
+      options.output.name.empty() ? options.output.path.filename().string() : options.output.name;
   layer.description = options.output.description;
   layer.attribution = options.output.attribution;
   // Clients cache by version, so it changes when, and only when, a tile does.
@@ -150,21 +151,21 @@ BuildReport mesh_pass(const BuildOptions& options, const BuildPlan& plan,
   BuildReport report = empty_report(options, plan, memory);
   const auto started = std::chrono::steady_clock::now();
   const std::unique_ptr<BorderStore> borders = make_memory_border_store();
-  const TileGraphResult result = run_tile_graph(
-      plan, heightfield, *borders, sink,
-      {.threads = options.run.threads,
-       .max_in_flight = memory.max_in_flight,
-       .gzip_level = options.encode.gzip_level},
-      progress, [&report](const TileWork& work) { report.add(work); });
+  const TileGraphResult result =
+      run_tile_graph(plan, heightfield, *borders, sink,
+                     {.threads = options.run.threads,
+                      .max_in_flight = memory.max_in_flight,
+                      .gzip_level = options.encode.gzip_level},
+                     progress, [&report](const TileWork& work) { report.add(work); });
   if (result.stopped) {
-    throw Interrupted(fmt::format(
-        "stopped after {} of {} tiles; {} holds no finished tile set (build again with --overwrite)",
-        result.tiles_done, plan.tile_count(), options.output.path.string()));
+    throw Interrupted(
+        fmt::format("stopped after {} of {} tiles; {} holds no finished tile set (build again with "
+                    "--overwrite)",
+                    result.tiles_done, plan.tile_count(), options.output.path.string()));
   }
   QMPIPE_CHECK(borders->size() == 0);
   report.largest_in_flight = result.largest_in_flight;
-  report.mesh_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  report.mesh_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
   return report;
 }
 

@@ -34,9 +34,9 @@ std::vector<std::string> violated_rules(const BuildOptions& options) {
           fmt::format("--max-zoom must be 0..{}", kMaxZoom));
   require(!mesh.max_zoom || *mesh.max_zoom >= mesh.min_zoom,
           "--max-zoom must not be less than --min-zoom");
-  require(is_tolerance(mesh.root_tolerance_m),
-          fmt::format("--tolerance must be {}..{} metres", kSmallestToleranceM,
-                      kLargestToleranceM));
+  require(
+      is_tolerance(mesh.root_tolerance_m),
+      fmt::format("--tolerance must be {}..{} metres", kSmallestToleranceM, kLargestToleranceM));
   for (const auto& [zoom, tolerance_m] : mesh.tolerance_at_m) {
     require(zoom >= 0 && zoom <= kMaxZoom && is_tolerance(tolerance_m),
             fmt::format("--tolerance-at {}={}: the zoom must be 0..{}, the tolerance {}..{} metres",

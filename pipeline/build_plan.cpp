@@ -68,8 +68,8 @@ class RangeBound {
     for (std::int32_t dy = -1; dy <= 1; ++dy) {
       for (std::int32_t dx = -1; dx <= 1; ++dx) {
         const std::int32_t columns = scheme_.columns(key.zoom);
-        const SurveyedTile* tile = find(
-            {.zoom = key.zoom, .x = (key.x + dx + columns) % columns, .y = key.y + dy});
+        const SurveyedTile* tile =
+            find({.zoom = key.zoom, .x = (key.x + dx + columns) % columns, .y = key.y + dy});
         if (tile == nullptr) continue;
         low_m = std::min(low_m, static_cast<double>(tile->lowest_m));
         high_m = std::max(high_m, static_cast<double>(tile->highest_m));
@@ -115,8 +115,7 @@ Recipe recipe_for(const BuildOptions& options, const Survey& survey,
   for (std::int32_t zoom = 0; zoom <= survey.max_zoom; ++zoom) {
     const double tolerance_m = tolerance_at(options.mesh, zoom);
     const Result<double> step = height_step_for(
-        tolerance_m,
-        largest_range_m(options, survey, zoom, keys[static_cast<std::size_t>(zoom)]));
+        tolerance_m, largest_range_m(options, survey, zoom, keys[static_cast<std::size_t>(zoom)]));
     if (!step) {
       throw UsageError(fmt::format("--tolerance at zoom {}: {}", zoom, step.error().message));
     }

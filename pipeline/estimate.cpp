@@ -79,8 +79,8 @@ std::string bytes_text(std::int64_t bytes) {
 }
 
 std::string estimate_text(const Estimate& estimate) {
-  std::string text = fmt::format("{:>4} {:>10} {:>12} {:>14}\n", "zoom", "tiles", "size",
-                                 "core seconds");
+  std::string text =
+      fmt::format("{:>4} {:>10} {:>12} {:>14}\n", "zoom", "tiles", "size", "core seconds");
   for (const ZoomEstimate& zoom : estimate.zooms) {
     text += fmt::format("{:>4} {:>10} {:>12} {:>14.1f}\n", zoom.zoom, zoom.tiles,
                         bytes_text(zoom.bytes), zoom.seconds);

@@ -118,12 +118,9 @@ void Progress::report(bool final) {
     return;
   }
   if (style_ != ProgressStyle::kTerminal) return;
-  std::string text = fmt::format("\r\033[K{}: {}/{} {} ({:.0f} %), {:.0f}/s", phase_, done, total_,
-                                 unit_,
-                                 total_ > 0 ? 100.0 * static_cast<double>(done) /
-                                                  static_cast<double>(total_)
-                                            : 100.0,
-                                 rate);
+  std::string text = fmt::format(
+      "\r\033[K{}: {}/{} {} ({:.0f} %), {:.0f}/s", phase_, done, total_, unit_,
+      total_ > 0 ? 100.0 * static_cast<double>(done) / static_cast<double>(total_) : 100.0, rate);
   if (final) {
     text += ", took " + duration_text(elapsed_s) + "\n";
   } else {

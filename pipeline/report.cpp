@@ -68,9 +68,9 @@ std::string write_report(const BuildReport& report) {
 }
 
 std::string report_table(const BuildReport& report) {
-  std::string text = fmt::format("{:>4} {:>9} {:>9} {:>9} {:>12} {:>12} {:>12} {:>12}\n", "zoom",
-                                 "tiles", "mean V", "mean T", "bytes", "tolerance m",
-                                 "max error m", "RMS error m");
+  std::string text =
+      fmt::format("{:>4} {:>9} {:>9} {:>9} {:>12} {:>12} {:>12} {:>12}\n", "zoom", "tiles",
+                  "mean V", "mean T", "bytes", "tolerance m", "max error m", "RMS error m");
   for (const BuiltZoom& zoom : report.zooms) {
     const auto tiles = static_cast<double>(std::max<std::int64_t>(1, zoom.tiles));
     text += fmt::format("{:>4} {:>9} {:>9.1f} {:>9.1f} {:>12} {:>12.3f} {:>12.3f} {:>12.3f}\n",

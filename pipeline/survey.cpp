@@ -32,9 +32,7 @@ std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options) {
 // Runs body(k) for 0 <= k < count on the arena's threads; an exception ends the loop and comes out.
 template <class Body>
 void for_each_index(tbb::task_arena& arena, std::size_t count, const Body& body) {
-  arena.execute([&] {
-    tbb::parallel_for(std::size_t{0}, count, body);
-  });
+  arena.execute([&] { tbb::parallel_for(std::size_t{0}, count, body); });
 }
 
 std::vector<BlockKey> covered_blocks(const TilingScheme& scheme, std::int32_t zoom,
@@ -48,10 +46,11 @@ std::vector<BlockKey> covered_blocks(const TilingScheme& scheme, std::int32_t zo
       return static_cast<std::int32_t>(std::floor(post / kBlockPosts));
     };
     const std::int32_t first_x = block(lattice.column_at(box.west_deg) - 1);
-    const std::int32_t last_x = std::min(block(lattice.column_at(box.east_deg) + 1),
-                                         first_x + scheme.columns(zoom) - 1);
+    const std::int32_t last_x =
+        std::min(block(lattice.column_at(box.east_deg) + 1), first_x + scheme.columns(zoom) - 1);
     const std::int32_t first_y = std::max(0, block(lattice.row_at(box.south_deg) - 1));
-    const std::int32_t last_y = std::min(scheme.rows(zoom), block(lattice.row_at(box.north_deg) + 1));
+    const std::int32_t last_y =
+        std::min(scheme.rows(zoom), block(lattice.row_at(box.north_deg) + 1));
     for (std::int32_t y = first_y; y <= last_y; ++y) {
       for (std::int32_t x = first_x; x <= last_x; ++x) {
         const std::int32_t columns = scheme.columns(zoom);
@@ -172,7 +171,8 @@ std::optional<float> Surveyor::settle_pole(const std::vector<BlockKey>& blocks,
   for (const BlockKey& block : blocks) {
     if (block.zoom != zoom || block.y != j / kBlockPosts) continue;
     survey_.store->read(lattice, window_of(block), block_m);
-    std::replace_if(row, row + kBlockPosts, [](float h) { return !std::isnan(h); }, height_m);
+    std::replace_if(
+        row, row + kBlockPosts, [](float h) { return !std::isnan(h); }, height_m);
     survey_.store->put_block(zoom, block.x, block.y, block_m);
   }
   return height_m;

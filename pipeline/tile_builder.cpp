@@ -55,8 +55,8 @@ void TileBuilder::simplify(TileWork& work, FixedBorders fixed, const PlannedTile
                                  .curvature = Curvature::kCounts};
   for (const Side side : kSides) {
     if (planned.roles[index_of(side)] == SideRole::kSelf) {
-      fixed[index_of(side)] = meridian_border(*work.grid, work.heights_m, options.tolerance_m,
-                                              options.height_step_m);
+      fixed[index_of(side)] =
+          meridian_border(*work.grid, work.heights_m, options.tolerance_m, options.height_step_m);
     }
   }
   work.tin = strip_ordered(greedy_insertion(*work.grid, work.heights_m, fixed, options));

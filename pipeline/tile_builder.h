@@ -30,8 +30,8 @@ struct TileWork {
   TileIndex index = kNoTile;
   TileKey key;
   std::unique_ptr<TileGrid> grid;
-  WindowHeights window;           // with a halo of one post
-  std::vector<float> heights_m;   // the tile's own 257 x 257 posts
+  WindowHeights window;          // with a halo of one post
+  std::vector<float> heights_m;  // the tile's own 257 x 257 posts
   std::vector<std::uint8_t> valid;
   Tin tin;
   QuantizedMesh mesh;
@@ -70,8 +70,7 @@ class StageClock {
       : seconds_(work.seconds.at(static_cast<std::size_t>(stage))),
         started_(std::chrono::steady_clock::now()) {}
   ~StageClock() {
-    seconds_ +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
   }
   StageClock(const StageClock&) = delete;
   StageClock& operator=(const StageClock&) = delete;

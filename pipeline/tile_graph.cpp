@@ -75,8 +75,7 @@ TileGraph::TileGraph(const BuildPlan& plan, const Heightfield& heightfield, Bord
       mesh_node_(graph_, flow::unlimited, [this](const Message& m) { return mesh(m); }),
       finish_node_(graph_, flow::unlimited, [this](const Message& m) { return finish(m); }),
       encode_node_(graph_, flow::unlimited, [this](const Message& m) { return encode_tile(m); }),
-      sequencer_(graph_,
-                 [](const Message& m) { return static_cast<std::size_t>(m->index); }),
+      sequencer_(graph_, [](const Message& m) { return static_cast<std::size_t>(m->index); }),
       sink_node_(graph_, flow::serial, [this](const Message& m) {
         store(m);
         return flow::continue_msg();
@@ -113,8 +112,8 @@ FixedBorders TileGraph::inherited(const PlannedTile& planned) {
   for (const Side side : kSides) {
     if (planned.roles[index_of(side)] != SideRole::kHeir) continue;
     const TileIndex owner = planned.neighbours[index_of(side)];
-    fixed[index_of(side)] = borders_.take(
-        plan_.wavefront.tiles[static_cast<std::size_t>(owner)].key, opposite(side));
+    fixed[index_of(side)] =
+        borders_.take(plan_.wavefront.tiles[static_cast<std::size_t>(owner)].key, opposite(side));
   }
   return fixed;
 }

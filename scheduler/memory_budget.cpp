@@ -20,8 +20,7 @@ constexpr std::int32_t comfortable_in_flight(std::int32_t threads) {
 
 MemoryPlan plan_memory(std::int64_t limit_bytes, const MemoryNeeds& needs) {
   QMPIPE_CHECK(needs.threads >= 1 && limit_bytes >= 0);
-  const std::int64_t fixed =
-      kProgramBytes + needs.lattice_bytes + needs.tiles * kPlanBytesPerTile;
+  const std::int64_t fixed = kProgramBytes + needs.lattice_bytes + needs.tiles * kPlanBytesPerTile;
   const std::int64_t smallest_cache = std::max(kSmallestCacheBytes, 4 * needs.source_block_bytes);
 
   MemoryPlan plan;
@@ -38,8 +37,8 @@ MemoryPlan plan_memory(std::int64_t limit_bytes, const MemoryNeeds& needs) {
   };
   if (limit_bytes > 0) {
     // First the cache down to its least, then the tiles and samplers.
-    plan.raster_cache_bytes = std::clamp(limit_bytes - fixed - working_bytes(), smallest_cache,
-                                         plan.raster_cache_bytes);
+    plan.raster_cache_bytes =
+        std::clamp(limit_bytes - fixed - working_bytes(), smallest_cache, plan.raster_cache_bytes);
     const std::int64_t left = limit_bytes - fixed - plan.raster_cache_bytes;
     plan.max_in_flight = static_cast<std::int32_t>(
         std::clamp<std::int64_t>(left / kTileInFlightBytes, 1, plan.max_in_flight));

@@ -99,9 +99,7 @@ Sphere improved_sphere(Vec3 centre, std::span<const Vec3> points) {
 
 Vec3 plus(const Vec3& a, const Vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec3 scaled(const Vec3& a, double factor) {
-  return {a[0] * factor, a[1] * factor, a[2] * factor};
-}
+Vec3 scaled(const Vec3& a, double factor) { return {a[0] * factor, a[1] * factor, a[2] * factor}; }
 Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
@@ -159,9 +157,9 @@ double occlusion_magnitude(const Vec3& unit_direction_scaled, const Vec3& point_
 Vec3 horizon_occlusion_point(const Vec3& direction_ecef, std::span<const Vec3> points_ecef) {
   // The sphere of a root tile may stand at the earth's centre, from where no ray is the right one.
   if (length(direction_ecef) == 0) return {kNeverHidden, 0, 0};
-  const Vec3 direction = unit({direction_ecef[0] / kEquatorialRadiusM,
-                               direction_ecef[1] / kEquatorialRadiusM,
-                               direction_ecef[2] / kPolarRadiusM});
+  const Vec3 direction =
+      unit({direction_ecef[0] / kEquatorialRadiusM, direction_ecef[1] / kEquatorialRadiusM,
+            direction_ecef[2] / kPolarRadiusM});
   double magnitude = 0;
   for (const Vec3& p : points_ecef) {
     magnitude = std::max(magnitude, occlusion_magnitude(direction, p));

@@ -38,8 +38,8 @@ struct LessUrgent {
 
 class GreedyInsertion {
  public:
-  GreedyInsertion(const TileGrid& grid, std::span<const float> heights_m,
-                  const FixedBorders& fixed, const GreedyOptions& options);
+  GreedyInsertion(const TileGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
+                  const GreedyOptions& options);
   Tin run();
 
  private:
@@ -56,8 +56,7 @@ class GreedyInsertion {
     double at_first = 0;
     double step = 0;
     RowLine from(std::int32_t i) const {
-      return {.start = static_cast<float>(at_first + step * i),
-              .step = static_cast<float>(step)};
+      return {.start = static_cast<float>(at_first + step * i), .step = static_cast<float>(step)};
     }
   };
   struct TrianglePlanes {
@@ -112,15 +111,15 @@ GreedyInsertion::GreedyInsertion(const TileGrid& grid, std::span<const float> he
     heights_[k] = static_cast<float>(static_cast<double>(heights_m[k]) - base_m_);
   }
   // What float arithmetic may lose on the way comes off the tolerance, so that the bound is true.
-  const double largest = std::max(std::abs(*low - base_m_), std::abs(*high - base_m_)) +
-                         options.height_step_m;
+  const double largest =
+      std::max(std::abs(*low - base_m_), std::abs(*high - base_m_)) + options.height_step_m;
   const double rounding = 6 * largest * static_cast<double>(std::numeric_limits<float>::epsilon());
   threshold_ =
       static_cast<float>(std::max(options.tolerance_m - rounding, options.tolerance_m / 2));
 
   curvature_ = curvature_terms(grid);
-  curved_ = options.curvature == Curvature::kCounts &&
-            largest_sagitta_m(grid) > options.tolerance_m / 64;
+  curved_ =
+      options.curvature == Curvature::kCounts && largest_sagitta_m(grid) > options.tolerance_m / 64;
   if (curved_) {
     curved_heights_.resize(kTilePostCount + WorstPost::kOverread);
     for (std::int32_t j = 0; j < kTilePosts; ++j) {
@@ -166,8 +165,7 @@ void GreedyInsertion::insert_initial_vertices(const FixedBorders& fixed) {
   const std::int32_t cells = options_.initial_grid_cells;
   for (std::int32_t row = 0; cells > 0 && row <= cells; ++row) {
     for (std::int32_t column = 0; column <= cells; ++column) {
-      const std::int32_t post =
-          tile_post_index(column * kEnd / cells, row * kEnd / cells);
+      const std::int32_t post = tile_post_index(column * kEnd / cells, row * kEnd / cells);
       if (blocked_[at(post)] == 0) insert_post(post, last());
     }
   }
@@ -183,8 +181,8 @@ void GreedyInsertion::for_each_row(Index triangle, const Row& row) const {
     j_last = std::max(j_last, j);
   }
   scan_triangle(grid_, mesh_.point(mesh_.vertex(triangle, 0)),
-                mesh_.point(mesh_.vertex(triangle, 1)), mesh_.point(mesh_.vertex(triangle, 2)),
-                1.0, j_first, j_last, row);
+                mesh_.point(mesh_.vertex(triangle, 1)), mesh_.point(mesh_.vertex(triangle, 2)), 1.0,
+                j_first, j_last, row);
 }
 
 GreedyInsertion::TrianglePlanes GreedyInsertion::planes_of(Index triangle) const {
@@ -197,9 +195,7 @@ GreedyInsertion::TrianglePlanes GreedyInsertion::planes_of(Index triangle) const
   TrianglePlanes planes;
   planes.height = plane(vertex_height(a), vertex_height(b), vertex_height(c));
   if (curved_) {
-    const auto latitude = [&](Index v) {
-      return curvature_.latitude_squared_at(mesh_.point(v).y);
-    };
+    const auto latitude = [&](Index v) { return curvature_.latitude_squared_at(mesh_.point(v).y); };
     const auto longitude = [&](Index v) {
       return curvature_.longitude_squared_at(mesh_.point(v).x);
     };
@@ -221,8 +217,8 @@ GreedyInsertion::PlaneRow GreedyInsertion::curved_row(const TrianglePlanes& plan
                                                       std::int32_t j) const {
   const double v = grid_.v_exact[at(j)];
   const double parallel = curvature_.parallel_scale[at(j)];
-  const double start = planes.latitude_squared.at(0, v) +
-                       parallel * planes.longitude_squared.at(0, v);
+  const double start =
+      planes.latitude_squared.at(0, v) + parallel * planes.longitude_squared.at(0, v);
   const double step = planes.latitude_squared.du + parallel * planes.longitude_squared.du;
   return {.at_first = planes.height.at(0, v) + curvature_.metres_per_unit * start,
           .step = (planes.height.du + curvature_.metres_per_unit * step) * kUnitsPerPost};
@@ -258,7 +254,8 @@ Worst GreedyInsertion::worst_free_post(Index triangle) const {
       if (blocked_[at(post)] != 0) continue;
       double error = std::abs(flat.at_first + flat.step * i - heights_[at(post)]);
       if (curved_) {
-        error = std::max(error, std::abs(bent.at_first + bent.step * i - curved_heights_[at(post)]));
+        error =
+            std::max(error, std::abs(bent.at_first + bent.step * i - curved_heights_[at(post)]));
       }
       if (static_cast<float>(error) > worst.error) worst = {static_cast<float>(error), post};
     }

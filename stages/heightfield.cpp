@@ -58,8 +58,8 @@ void Heightfield::fill(const Lattice& lattice, const PostWindow& window, std::in
   if (!any_void(heights_m)) return;
   const auto base_m = static_cast<float>(policy_.base_height_m);
   if (levels == 0) {
-    std::replace_if(heights_m.begin(), heights_m.end(), [](float h) { return std::isnan(h); },
-                    base_m);
+    std::replace_if(
+        heights_m.begin(), heights_m.end(), [](float h) { return std::isnan(h); }, base_m);
     return;
   }
   const Lattice coarser(scheme_, lattice.zoom() - 1);
@@ -93,8 +93,8 @@ void Heightfield::fill_pole_rows(const Lattice& lattice, const PostWindow& windo
                                  std::int32_t levels, std::vector<float>& heights_m) const {
   for (const std::int32_t j : {0, lattice.rows() - 1}) {
     if (!lattice.is_pole_row(j) || j < window.j0 || j >= window.j0 + window.height_posts) continue;
-    const auto row = heights_m.begin() +
-                     static_cast<std::ptrdiff_t>(position(window, window.i0, j));
+    const auto row =
+        heights_m.begin() + static_cast<std::ptrdiff_t>(position(window, window.i0, j));
     std::fill(row, row + window.width_posts, pole_height_m(lattice.zoom(), j == 0 ? 0 : 1, levels));
   }
 }

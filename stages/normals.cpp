@@ -34,7 +34,7 @@ class PostFrame {
 
  private:
   struct Row {
-    double radius_m = 0;   // distance of the ellipsoid's point from the axis
+    double radius_m = 0;  // distance of the ellipsoid's point from the axis
     double z_m = 0;
     double up_radius = 0;  // components of the unit vector up
     double up_z = 0;

@@ -48,8 +48,7 @@ std::vector<double> surface_at_posts(const TileGrid& grid, const QuantizedMesh& 
   return surface;
 }
 
-void place_vertices(const TileGrid& grid, const QuantizedMesh& mesh,
-                    std::vector<double>& surface) {
+void place_vertices(const TileGrid& grid, const QuantizedMesh& mesh, std::vector<double>& surface) {
   for (std::size_t k = 0; k < mesh.vertex_count(); ++k) {
     const auto column = std::lower_bound(grid.u.begin(), grid.u.end(), mesh.u[k]);
     const auto row = std::lower_bound(grid.v.begin(), grid.v.end(), mesh.v[k]);

@@ -14,9 +14,9 @@ namespace qmpipe {
 struct ErrorSummary {
   std::int64_t posts = 0;  // valid posts judged
   double largest_m = 0;
-  double sum_m = 0;             // of magnitudes
+  double sum_m = 0;  // of magnitudes
   double sum_of_squares_m2 = 0;
-  Post worst;              // of the tile, where largest_m was found first (lowest index)
+  Post worst;  // of the tile, where largest_m was found first (lowest index)
 
   void add(const ErrorSummary& other);
   double mean_m() const;

@@ -83,8 +83,8 @@ void scan_triangle(const TileGrid& grid, const IntPoint& a, const IntPoint& b, c
     const double to = std::min({right[0].at(v), right[1].at(v), u_high});
     // from and to are within the tile widened by the margin, so truncation is safe after the shift.
     const auto i_first = std::max(0, static_cast<std::int32_t>(std::ceil(from * kPostsPerUnit)));
-    const auto i_last = std::min(kTileIntervals,
-                                 static_cast<std::int32_t>(std::floor(to * kPostsPerUnit)));
+    const auto i_last =
+        std::min(kTileIntervals, static_cast<std::int32_t>(std::floor(to * kPostsPerUnit)));
     if (i_first <= i_last) row(j, i_first, i_last);
   }
 }

@@ -78,8 +78,7 @@ class BuildTest : public ::testing::Test {
     Progress progress(ProgressStyle::kSilent, nullptr);
     VerifyOptions check;
     check.sources = options.input.paths;
-    const VerifyReport report =
-        verify(*open_tile_set(options.output.path), check, progress);
+    const VerifyReport report = verify(*open_tile_set(options.output.path), check, progress);
     EXPECT_EQ(report.fault_count, 0) << text_of(report);
     EXPECT_LT(report.largest_crack_m, 1e-3);
     EXPECT_GT(report.tiles, 0);
@@ -124,8 +123,7 @@ TEST_F(BuildTest, VerifyFindsNothingInAnyScheme) {
       options.output.overwrite = Overwrite::kYes;
       options.mesh.projection = projection;
       options.mesh.reduction = reduction;
-      options.mesh.voids.kind =
-          seed % 2 == 0 ? VoidPolicy::Kind::kPull : VoidPolicy::Kind::kHeight;
+      options.mesh.voids.kind = seed % 2 == 0 ? VoidPolicy::Kind::kPull : VoidPolicy::Kind::kHeight;
       run(options);
       expect_sound(options);
     }

@@ -25,7 +25,7 @@ struct BuildArguments {
   std::string resampling = name_of(Resampling::kBilinear);
   std::string reduction = name_of(Reduction::kMean);
   std::string voids = "pull";
-  std::string gzip = "9";
+  std::string gzip = "7";
   std::string memory = "0";
   std::string tolerances;
   std::int32_t max_zoom = -1;
@@ -86,8 +86,8 @@ void print_effective(const BuildOptions& options) {
 int run_build(const BuildArguments& arguments) {
   const BuildOptions options = to_options(arguments);
   if (arguments.verbose) print_effective(options);
-  ProgressStyle style = isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal
-                                                   : ProgressStyle::kSilent;
+  ProgressStyle style =
+      isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent;
   if (arguments.json) style = ProgressStyle::kJsonLines;
   Progress progress(style, stop_flag_of_signals());
   const BuildResult result = build_pyramid(options, progress);
@@ -97,11 +97,12 @@ int run_build(const BuildArguments& arguments) {
   } else if (arguments.json) {
     text = write_report(result.report);
   } else {
-    text = report_table(result.report) +
-           fmt::format("built: {} tiles, {} in {} (survey {:.1f} s, mesh {:.1f} s, peak memory {})\n",
-                       result.report.tiles, bytes_text(result.report.stored_bytes),
-                       options.output.path.string(), result.report.survey_s, result.report.mesh_s,
-                       bytes_text(result.report.peak_resident_bytes));
+    text =
+        report_table(result.report) +
+        fmt::format("built: {} tiles, {} in {} (survey {:.1f} s, mesh {:.1f} s, peak memory {})\n",
+                    result.report.tiles, bytes_text(result.report.stored_bytes),
+                    options.output.path.string(), result.report.survey_s, result.report.mesh_s,
+                    bytes_text(result.report.peak_resident_bytes));
   }
   std::fputs(text.c_str(), stdout);
   return 0;
@@ -128,15 +129,18 @@ void add_input_options(CLI::App& command, BuildArguments& arguments) {
       ->capture_default_str()
       ->check(CLI::IsMember({"mean", "subsample", "max", "min"}));
   command
-      .add_option("--nodata", arguments.voids,
-                  "What fills voids: pull (from the coarser zooms, fading to 0 m some 64 posts from "
-                  "the data) or height=H in metres")
+      .add_option(
+          "--nodata", arguments.voids,
+          "What fills voids: pull (from the coarser zooms, fading to 0 m some 64 posts from "
+          "the data) or height=H in metres")
       ->capture_default_str();
 }
 
 void add_mesh_options(CLI::App& command, BuildArguments& arguments) {
   MeshOptions& mesh = arguments.options.mesh;
-  command.add_option("--scheme", arguments.scheme, "Tiling scheme: geodetic (EPSG:4326) or mercator (EPSG:3857)")
+  command
+      .add_option("--scheme", arguments.scheme,
+                  "Tiling scheme: geodetic (EPSG:4326) or mercator (EPSG:3857)")
       ->capture_default_str()
       ->check(CLI::IsMember({"geodetic", "mercator"}));
   command.add_option("--min-zoom", mesh.min_zoom, "Coarsest zoom (above 0: a set without roots)")
@@ -207,7 +211,8 @@ void register_build(CLI::App& app, std::function<int()>& action) {
       "  qmpipe build dem.tif -o tiles --attribution \"(c) Survey Office\"\n"
       "  qmpipe build fine.tif coarse.tif -o tiles --max-zoom 12 --tolerance-at 12=2 --memory 2G\n"
       "Exit codes: 0 built, 1 failed, 2 wrong usage, 130 interrupted.");
-  command->callback([arguments, &action] { action = [arguments] { return run_build(*arguments); }; });
+  command->callback(
+      [arguments, &action] { action = [arguments] { return run_build(*arguments); }; });
 }
 
 }  // namespace qmpipe

@@ -1,0 +1,103 @@
+#include "pipeline/verify_source.h"
+
+#include <oneapi/tbb/enumerable_thread_specific.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "formats/raster_source.h"
+#include "pipeline/survey.h"
+#include "stages/sampling.h"
+
+namespace qmpipe {
+namespace {
+
+class SurveyedPosts final : public SourcePosts {
+ public:
+  SurveyedPosts(Recipe recipe, Survey survey)
+      : recipe_(std::move(recipe)),
+        survey_(std::move(survey)),
+        heightfield_(*survey_.store, survey_.scheme, recipe_.voids, survey_.pole_heights) {}
+
+  std::optional<WindowHeights> posts(const TileKey& key) const override {
+    if (key.zoom > survey_.sampling_zoom) return std::nullopt;
+    return heightfield_.window(key.zoom, Lattice::tile_window(key, 0));
+  }
+  std::optional<double> tolerance_m(std::int32_t zoom) const override {
+    const auto at = static_cast<std::size_t>(zoom);
+    if (at >= recipe_.tolerance_m.size()) return std::nullopt;
+    return recipe_.tolerance_m[at];
+  }
+  std::vector<TileKey> expected_tiles() const override {
+    std::vector<TileKey> keys;
+    for (const std::vector<SurveyedTile>& zoom : survey_.tiles) {
+      for (const SurveyedTile& tile : zoom) {
+        if (tile.key.zoom >= recipe_.min_zoom) keys.push_back(tile.key);
+      }
+    }
+    return keys;
+  }
+
+ private:
+  Recipe recipe_;
+  Survey survey_;
+  Heightfield heightfield_;
+};
+
+class SampledPosts final : public SourcePosts {
+ public:
+  SampledPosts(const SourceOptions& options, const TilingScheme& scheme)
+      : scheme_(scheme), samplers_([options] { return open_sampler(options); }) {}
+
+  std::optional<WindowHeights> posts(const TileKey& key) const override {
+    const Lattice lattice(scheme_, key.zoom);
+    WindowHeights heights;
+    heights.window = Lattice::tile_window(key, 0);
+    heights.heights_m.assign(heights.window.size(), 0.0F);
+    heights.valid.assign(heights.window.size(), 0);
+    Sampler& sampler = *samplers_.local();
+    if (!sampler.may_cover(lattice, heights.window)) return heights;
+    sampler.sample(lattice, heights.window, heights.heights_m);
+    std::transform(heights.heights_m.begin(), heights.heights_m.end(), heights.valid.begin(),
+                   [](float h) { return static_cast<std::uint8_t>(std::isnan(h) ? 0 : 1); });
+    return heights;
+  }
+  std::optional<double> tolerance_m(std::int32_t) const override { return std::nullopt; }
+  std::vector<TileKey> expected_tiles() const override { return {}; }
+
+ private:
+  static std::unique_ptr<Sampler> open_sampler(const SourceOptions& options) {
+    std::vector<std::unique_ptr<RasterSource>> sources;
+    for (const std::string& input : options.inputs) {
+      sources.push_back(RasterSource::open(input, {.crs_override = options.source_crs}));
+    }
+    return std::make_unique<Sampler>(std::move(sources), Resampling::kBilinear);
+  }
+
+  TilingScheme scheme_;
+  // A sampler belongs to one thread; each thread opens its own when it first needs it.
+  mutable tbb::enumerable_thread_specific<std::unique_ptr<Sampler>> samplers_;
+};
+
+}  // namespace
+
+std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
+                                               const TilingScheme& scheme,
+                                               const std::optional<Recipe>& recipe,
+                                               Progress& progress) {
+  SurveyOptions survey = {.inputs = options.inputs, .source_crs = options.source_crs};
+  survey.threads = options.threads;
+  if (!recipe) {
+    describe_inputs(survey);  // an input that cannot be opened is told before work starts
+    return std::make_unique<SampledPosts>(options, scheme);
+  }
+  survey.resampling = recipe->resampling;
+  survey.reduction = recipe->reduction;
+  survey.scheme = scheme;
+  survey.sampling_zoom = recipe->sampling_zoom;
+  survey.max_zoom = recipe->max_zoom;
+  return std::make_unique<SurveyedPosts>(*recipe, run_survey(survey, progress));
+}
+
+}  // namespace qmpipe

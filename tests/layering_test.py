@@ -1,0 +1,243 @@
+#!/usr/bin/env python3
+"""Holds the layout rules of the repository by reading its files (DESIGN 2, CONVENTIONS 2).
+
+Checked: includes point one way (scheduler <- formats <- stages <- pipeline <- tools; tests and perf
+may include anything); each third-party library is included only where the table below allows it,
+and in no header of ours; every header opens with a comment and has #pragma once; no file is longer
+than 600 lines; no top-level folder that nobody agreed on.
+
+  layering_test.py [ROOT]       checks a tree, prints every violation, exits 1 when there is one
+  layering_test.py --self-test  builds trees with one violation each and checks that it is found
+"""
+
+import pathlib
+import re
+import sys
+import tempfile
+
+LAYERS = ["scheduler", "formats", "stages", "pipeline", "tools"]
+FREE_FOLDERS = ["tests", "perf"]  # these see everything, and nothing of a layer may include them
+ALLOWED_FOLDERS = {*LAYERS, *FREE_FOLDERS, "docs", ".ci"}
+# Never part of the project, whether or not they are there.
+IGNORED_FOLDERS = {".git", ".cache", ".vscode", ".idea", "build", "demo", "node_modules",
+                   "__pycache__"}
+
+# A third-party header and the layers whose .cpp files may include it. A header that no line matches
+# is a new dependency: decide which folder owns it and add a line.
+THIRD_PARTY = [
+    ("TBB", r"(tbb|oneapi)/", ["pipeline"]),
+    ("GDAL", r"(gdal|ogr|cpl_|vrtdataset|proj\.h)", ["formats"]),
+    ("HDF5", r"(hdf5|H5)", ["formats"]),
+    ("SQLite", r"sqlite3", ["formats"]),
+    ("zstd", r"zstd", ["formats"]),
+    ("libdeflate", r"libdeflate", ["formats", "pipeline"]),
+    ("nlohmann-json", r"nlohmann/", ["formats", "pipeline", "tools"]),
+    ("meshoptimizer", r"meshoptimizer", ["stages"]),
+    ("CGAL", r"(CGAL|boost)/", ["stages"]),
+    ("CLI11", r"CLI/", ["tools"]),
+    ("cpp-httplib", r"httplib", ["tools"]),
+    ("spdlog/fmt", r"(spdlog|fmt)/", LAYERS),
+    ("GoogleTest", r"(gtest|gmock)/", []),
+    ("Google Benchmark", r"benchmark/", []),
+]
+
+# C++ standard headers have no suffix and no folder.
+STANDARD = re.compile(r"[a-z0-9_]+$")
+# The operating system's, for .cpp files only.
+SYSTEM = re.compile(r"((sys|linux)/\w+|dirent|errno|fcntl|poll|pthread|sched|signal|termios|time"
+                    r"|unistd)\.h$")
+INCLUDE = re.compile(r'\s*#\s*include\s*([<"])([^>"]+)[>"]')
+
+WARN_LINES = 400
+FAIL_LINES = 600
+
+
+def layer_of(path):
+    return path.parts[0]
+
+
+def check_own_include(path, target):
+    """An #include "..." line; returns what is wrong with it, or None."""
+    folder = target.split("/")[0]
+    if "/" not in target or folder not in [*LAYERS, *FREE_FOLDERS]:
+        return f'"{target}" is not a path from the repository\'s root; third-party headers go in <>'
+    here = layer_of(path)
+    if here in FREE_FOLDERS or folder == here:
+        return None
+    if folder in FREE_FOLDERS:
+        return f'{here}/ includes "{target}": nothing includes {folder}/'
+    if LAYERS.index(folder) > LAYERS.index(here):
+        return f'{here}/ includes "{target}": includes point one way, {" <- ".join(LAYERS)}'
+    return None
+
+
+def check_foreign_include(path, target):
+    """An #include <...> line; returns what is wrong with it, or None."""
+    if STANDARD.match(target) or layer_of(path) in FREE_FOLDERS:
+        return None
+    if path.suffix == ".h":
+        return f"<{target}>: our headers include ours and the C++ standard's only"
+    if SYSTEM.match(target):
+        return None
+    for name, pattern, layers in THIRD_PARTY:
+        if re.match(pattern, target):
+            if layer_of(path) in layers:
+                return None
+            where = " and ".join(f"{layer}/" for layer in layers) or "tests/ and perf/"
+            return f"<{target}>: {name} belongs to {where}"
+    return f"<{target}>: a new dependency; give it a line in tests/layering_test.py"
+
+
+def check_includes(path, lines):
+    for number, line in enumerate(lines, start=1):
+        match = INCLUDE.match(line)
+        if not match:
+            continue
+        check = check_own_include if match.group(1) == '"' else check_foreign_include
+        problem = check(path, match.group(2))
+        if problem:
+            yield f"{path}:{number}: {problem}"
+
+
+def check_header(path, lines):
+    if not lines or not lines[0].startswith(("//", "/*")):
+        yield f"{path}:1: a header opens with a comment that says what it is for"
+    if "#pragma once" not in (line.strip() for line in lines):
+        yield f"{path}:1: a header has #pragma once"
+
+
+def project_files(root):
+    for folder in [*LAYERS, *FREE_FOLDERS, ".ci"]:
+        for path in sorted((root / folder).rglob("*")):
+            if path.is_file() and not IGNORED_FOLDERS & set(path.relative_to(root).parts):
+                yield path
+
+
+def check_tree(root):
+    """Returns (violations, warnings) as lists of lines."""
+    violations = []
+    warnings = []
+    for folder in sorted(p.name for p in root.iterdir() if p.is_dir()):
+        if folder not in ALLOWED_FOLDERS | IGNORED_FOLDERS:
+            violations.append(f"{folder}/: not one of the folders of DESIGN 2")
+    for absolute in project_files(root):
+        path = absolute.relative_to(root)
+        if path.suffix in (".hpp", ".hh", ".hxx", ".cc", ".cxx", ".c"):
+            violations.append(f"{path}: C++ files are called .h and .cpp")
+        if path.suffix not in (".h", ".cpp", ".py", ".sh"):
+            continue
+        lines = absolute.read_text(encoding="utf-8").splitlines()
+        if len(lines) > FAIL_LINES:
+            violations.append(f"{path}: {len(lines)} lines, {FAIL_LINES} is the limit; split it")
+        elif len(lines) > WARN_LINES:
+            warnings.append(f"{path}: {len(lines)} lines, {WARN_LINES} is long")
+        if path.suffix in (".h", ".cpp"):
+            violations += check_includes(path, lines)
+        if path.suffix == ".h":
+            violations += check_header(path, lines)
+    return violations, warnings
+
+
+# A tree without a fault: every pair that the rules allow and that is easy to get wrong.
+GOOD_TREE = {
+    "scheduler/a.h": "// A.\n#pragma once\n#include <vector>\n",
+    "formats/a.cpp": '#include "formats/a.h"\n#include "scheduler/a.h"\n#include <gdal_priv.h>\n'
+                     "#include <sqlite3.h>\n#include <zstd.h>\n#include <hdf5.h>\n"
+                     "#include <unistd.h>\n#include <libdeflate.h>\n#include <cpl_vsi.h>\n",
+    "stages/a.cpp": '#include "formats/a.h"\n#include <CGAL/Epick.h>\n#include <fmt/format.h>\n'
+                    "#include <meshoptimizer.h>\n",
+    "pipeline/a.cpp": '#include "stages/a.h"\n#include <tbb/flow_graph.h>\n'
+                      "#include <nlohmann/json.hpp>\n#include <spdlog/spdlog.h>\n",
+    "tools/a.cpp": '#include "pipeline/a.h"\n#include <CLI/CLI.hpp>\n#include <nlohmann/json.hpp>\n',
+    "tests/helper.h": '// H.\n#pragma once\n#include "tools/a.h"\n#include <gtest/gtest.h>\n',
+    "perf/a.cpp": '#include "tests/helper.h"\n#include <benchmark/benchmark.h>\n'
+                  "#include <tbb/flow_graph.h>\n",
+    "docs/a.md": "text\n",
+    "build/formats/a.h": "no header of ours\n",
+    "tests/__pycache__/a.h": "no header of ours\n",
+}
+
+HEADER = "// H.\n#pragma once\n"
+# (file, its text, what the violation must say)
+FAULTS = [
+    ("scheduler/b.cpp", '#include "formats/a.h"\n', "includes point one way"),
+    ("formats/b.h", HEADER + '#include "stages/a.h"\n', "formats/b.h:3: formats/ includes"),
+    ("stages/b.cpp", '#include "pipeline/a.h"\n', "includes point one way"),
+    ("pipeline/b.cpp", '#  include "tools/a.h"\n', "includes point one way"),
+    ("tools/b.cpp", '#include "tests/helper.h"\n', "nothing includes tests/"),
+    ("formats/b.cpp", '#include "a.h"\n', "not a path from the repository's root"),
+    ("formats/b.cpp", '#include "fmt/format.h"\n', "not a path from the repository's root"),
+    ("scheduler/b.cpp", "#include <tbb/concurrent_queue.h>\n", "TBB belongs to pipeline/"),
+    ("stages/b.cpp", "#include <oneapi/tbb.h>\n", "TBB belongs to pipeline/"),
+    ("pipeline/b.cpp", "#include <gdal_priv.h>\n", "GDAL belongs to formats/"),
+    ("tools/b.cpp", "#include <ogr_spatialref.h>\n", "GDAL belongs to formats/"),
+    ("tools/b.cpp", "#include <cpl_conv.h>\n", "GDAL belongs to formats/"),
+    ("stages/b.cpp", "#include <hdf5.h>\n", "HDF5 belongs to formats/"),
+    ("pipeline/b.cpp", "#include <sqlite3.h>\n", "SQLite belongs to formats/"),
+    ("pipeline/b.cpp", "#include <zstd.h>\n", "zstd belongs to formats/"),
+    ("stages/b.cpp", "#include <libdeflate.h>\n", "libdeflate belongs to formats/ and pipeline/"),
+    ("stages/b.cpp", "#include <nlohmann/json.hpp>\n", "nlohmann-json belongs to"),
+    ("formats/b.cpp", "#include <CGAL/Epick.h>\n", "CGAL belongs to stages/"),
+    ("pipeline/b.cpp", "#include <CLI/CLI.hpp>\n", "CLI11 belongs to tools/"),
+    ("formats/b.cpp", "#include <gtest/gtest.h>\n", "GoogleTest belongs to tests/ and perf/"),
+    ("formats/b.cpp", "#include <Eigen/Dense>\n", "a new dependency"),
+    ("stages/b.h", HEADER + "#include <fmt/format.h>\n", "our headers include ours"),
+    ("formats/b.h", HEADER + "#include <gdal_priv.h>\n", "our headers include ours"),
+    ("scheduler/b.h", "// No guard.\n", "has #pragma once"),
+    ("scheduler/b.h", "#pragma once\n// Late.\n", "opens with a comment"),
+    ("scheduler/b.h", "#pragma once", "opens with a comment"),
+    ("scheduler/b.hpp", HEADER, "are called .h and .cpp"),
+    ("stages/b.cpp", "int x;\n" * 601, "601 lines"),
+    ("tests/b.py", "x = 1\n" * 601, "601 lines"),
+    ("src/b.cpp", "int x;\n", "src/: not one of the folders"),
+]
+
+
+def write_tree(root, files):
+    for name, text in files.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def found_in(files):
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        write_tree(root, files)
+        return check_tree(root)
+
+
+def self_test():
+    failures = []
+    if found_in(GOOD_TREE) != ([], []):
+        failures.append(f"a tree without a fault: {found_in(GOOD_TREE)}")
+    for name, text, expected in FAULTS:
+        violations, _ = found_in({**GOOD_TREE, name: text})
+        if len(violations) != 1 or expected not in violations[0]:
+            failures.append(f"{name} with {text[:60]!r}: expected '{expected}', got {violations}")
+    violations, warnings = found_in({**GOOD_TREE, "stages/b.cpp": "int x;\n" * 401})
+    if violations or len(warnings) != 1:
+        failures.append("401 lines are a warning and not a violation")
+    for failure in failures:
+        print(f"self-test: {failure}")
+    print(f"self-test: {len(FAULTS) + 2} cases, {len(failures)} wrong")
+    return 1 if failures else 0
+
+
+def main(arguments):
+    if arguments == ["--self-test"]:
+        return self_test()
+    if len(arguments) > 1 or any(a.startswith("-") for a in arguments):
+        print(__doc__, file=sys.stderr)
+        return 2
+    root = pathlib.Path(arguments[0]) if arguments else pathlib.Path(__file__).parents[1]
+    violations, warnings = check_tree(root.resolve())
+    for warning in warnings:
+        print(f"warning: {warning}")
+    for violation in violations:
+        print(violation)
+    return 1 if violations else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,105 @@
+#include "tools/command_verify.h"
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "formats/tile_set.h"
+#include "pipeline/progress.h"
+#include "pipeline/verify.h"
+#include "tools/interrupt.h"
+
+namespace qmpipe {
+namespace {
+
+constexpr int kExitFaults = 3;
+
+constexpr const char* kFooter =
+    "Checks every tile: that it can be read under the strictest reading of the format; that its\n"
+    "triangles are counter-clockwise and cover the tile's square exactly once; corners and side\n"
+    "lists; the header's height range, bounding sphere and horizon occlusion point. Checks\n"
+    "neighbours: the same border vertices, less than 1 mm apart, with equal normals, across the\n"
+    "antimeridian too. Checks layer.json against the files: each listed tile is there and each\n"
+    "tile is listed, with its parents and the roots; extensions as listed.\n"
+    "\n"
+    "With --source, also the vertical distance between each zoom's posts and the decoded surface.\n"
+    "Posts of a set made by qmpipe are recomputed as its build did, and must be within each\n"
+    "zoom's tolerance; for another program's set the source is sampled bilinearly and the\n"
+    "distances are only reported. Give the same inputs in the same order as to the build.\n"
+    "--hausdorff adds the mean symmetric Hausdorff distance of Campos et al. 2020 (section 5.2)\n"
+    "between each tile without voids and the triangulation of all its posts: from vertices and\n"
+    "2000 random points of each to the other's surface (as the paper's numbers are), and between\n"
+    "the points alone (as its text says).\n"
+    "\n"
+    "The table has, for each zoom: tiles; mean vertices (V) and triangles (T); bytes as stored;\n"
+    "the largest crack in millimetres; the largest, mean and RMS vertical error and the tolerance\n"
+    "in metres.\n"
+    "\n"
+    "Exit code 0: no fault; 1: the set or the source cannot be opened; 2: usage; 3: faults found;\n"
+    "130: interrupted. Warnings do not count as faults.\n"
+    "\n"
+    "Examples:\n"
+    "  qmpipe verify out\n"
+    "  qmpipe verify out --source dem.tif --hausdorff --json > verify.json";
+
+struct VerifyArguments {
+  std::string path;
+  VerifyOptions options;
+  bool wants_hausdorff = false;
+  bool wants_json = false;
+};
+
+int run_verify(VerifyArguments arguments) {
+  if (arguments.wants_hausdorff) arguments.options.hausdorff = HausdorffMode::kMeasured;
+  const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
+  Progress progress(is_terminal ? ProgressStyle::kTerminal : ProgressStyle::kSilent,
+                    stop_flag_of_signals());
+  const std::unique_ptr<TileSet> tile_set = open_tile_set(arguments.path);
+  const VerifyReport report = verify(*tile_set, arguments.options, progress);
+  const std::string text = arguments.wants_json ? json_of(report) : text_of(report);
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  return report.fault_count == 0 ? 0 : kExitFaults;
+}
+
+}  // namespace
+
+void register_verify(CLI::App& app, std::function<int()>& action) {
+  const auto arguments = std::make_shared<VerifyArguments>();
+  VerifyOptions& options = arguments->options;
+  options.threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
+  CLI::App* command = app.add_subcommand(
+      "verify",
+      "Check a finished tile set: tiles, cracks, layer.json, and heights against a source");
+  command->footer(kFooter);
+  command->add_option("OUT", arguments->path, "The tile set's folder, or the layer.json in it")
+      ->required();
+  command
+      ->add_option("--source", options.sources,
+                   "DEMs that the set was made from, in order of priority")
+      ->type_name("INPUT");
+  command
+      ->add_option("--source-crs", options.source_crs,
+                   "Take this CRS instead of the one that the sources name (EPSG:n, WKT, PROJ)")
+      ->type_name("CRS");
+  command->add_flag("--hausdorff", arguments->wants_hausdorff,
+                    "Measure the symmetric Hausdorff distance too (needs --source)");
+  command->add_option("--threads", options.threads, "Threads; the report does not depend on them")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command
+      ->add_option("--max-faults", options.most_per_kind,
+                   "Faults and warnings of each kind to show; all are counted")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_flag("--json", arguments->wants_json, "Write one JSON object instead of a table");
+  command->callback(
+      [arguments, &action] { action = [arguments] { return run_verify(*arguments); }; });
+}
+
+}  // namespace qmpipe

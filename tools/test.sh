@@ -1,0 +1,199 @@
+#!/usr/bin/env bash
+# Sets up, builds and tests qmpipe, from a fresh clone on a bare Debian 12.
+#   tools/test.sh        what a change needs: the preset `dev` and its tests
+#   tools/test.sh --ci   also: format, address/undefined and thread sanitizers, fuzzing, clang-tidy
+# Every phase runs, whatever failed before it. The last line is "N passed, N failed[, N skipped]":
+# the tests of all phases, where a check without tests of its own (format, clang-tidy, a fuzz
+# target) counts as one, and a build counts only when it fails.
+#   QMPIPE_JOBS=N        compilers at a time, 2 unless said otherwise
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+mode=${1:-}
+if [ $# -gt 1 ] || { [ -n "$mode" ] && [ "$mode" != --ci ]; }; then
+  echo "usage: tools/test.sh [--ci]" >&2
+  exit 2
+fi
+
+jobs=${QMPIPE_JOBS:-2}
+fuzz_seconds=20
+# clang-tidy comes last and has what is left of this, within these bounds.
+ci_seconds=1140
+tidy_least_seconds=120
+tidy_most_seconds=360
+folders=()
+for folder in scheduler formats stages pipeline tools tests perf; do
+  # git keeps no empty folders, so one may be missing.
+  if [ -d "$folder" ]; then folders+=("$folder"); fi
+done
+passed=0
+failed=0
+skipped=0
+failures=()
+
+fail() {
+  failed=$((failed + 1))
+  failures+=("$1")
+}
+
+# phase NAME COMMAND...: runs it under a heading and says how long it took; never ends the script.
+phase() {
+  local name=$1 start=$SECONDS result=ok
+  shift
+  printf '\n== %s\n' "$name"
+  "$@" </dev/null || result=FAILED
+  if [ $result = FAILED ]; then fail "$name"; fi
+  printf -- '-- %s: %s, %d s\n' "$name" "$result" $((SECONDS - start))
+}
+
+# check NAME COMMAND...: a phase that is itself one test.
+check() {
+  local before=$failed
+  phase "$@"
+  if [ "$failed" -eq "$before" ]; then passed=$((passed + 1)); fi
+}
+
+configure_and_build() {
+  mkdir -p build
+  # The listing of the configure step matters only when it fails.
+  cmake --preset "$1" >"build/$1-configure.log" 2>&1 || { cat "build/$1-configure.log"; return 1; }
+  cmake --build --preset "$1" -j "$jobs" -- -k 0 >"build/$1-build.log" 2>&1 ||
+    { grep -vE '^\[[0-9]+/[0-9]+\] (Building|Linking) ' "build/$1-build.log"; return 1; }
+}
+
+# ctest_phase PRESET: adds the preset's tests to the sums.
+ctest_phase() {
+  local preset=$1 start=$SECONDS report=$PWD/build/$1-tests.xml status=0 counts
+  printf '\n== %s: tests\n' "$preset"
+  rm -f "$report"
+  ctest --preset "$preset" --output-junit "$report" </dev/null || status=$?
+  counts=$(python3 - "$report" <<'PYTHON'
+import sys
+import xml.etree.ElementTree as tree
+try:
+    cases = list(tree.parse(sys.argv[1]).getroot().iter("testcase"))
+except (OSError, tree.ParseError):
+    cases = []
+run = sum(case.get("status") == "run" for case in cases)
+# A test whose program is missing is "notrun" as well, but has no reason to be skipped.
+skipped = sum(case.get("status") == "disabled" or case.find("skipped") is not None for case in cases)
+print(run, len(cases) - run - skipped, skipped)
+PYTHON
+  )
+  local run bad left_out
+  read -r run bad left_out <<<"$counts"
+  # ctest also fails when there is no test at all.
+  if [ $status -ne 0 ] && [ "$bad" -eq 0 ]; then bad=1; fi
+  passed=$((passed + run))
+  failed=$((failed + bad))
+  skipped=$((skipped + left_out))
+  if [ "$bad" -gt 0 ]; then failures+=("$preset: $bad of its tests"); fi
+  printf -- '-- %s: tests: %d passed, %d failed, %d skipped, %d s\n' \
+    "$preset" "$run" "$bad" "$left_out" $((SECONDS - start))
+}
+
+build_and_test() {
+  phase "$1: build" configure_and_build "$1"
+  ctest_phase "$1"
+}
+
+format_check() {
+  local file bad=0
+  while read -r file; do
+    clang-format-14 --dry-run -Werror "$file" 2>/dev/null && continue
+    echo "$file"
+    bad=$((bad + 1))
+  done < <(find "${folders[@]}" -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' \) -print)
+  if [ $bad -gt 0 ]; then
+    echo "$bad files are not laid out as .clang-format says; clang-format-14 -i FILE mends one"
+    return 1
+  fi
+}
+
+# tidy_file FILE: quiet when there is nothing to say; leaves the file alone once the time is over.
+tidy_file() {
+  local said
+  if [ "$(date +%s)" -ge "$tidy_end" ]; then
+    echo "$1" >>build/tidy-not-reached.log
+    return 0
+  fi
+  said=$(clang-tidy-14 --quiet --warnings-as-errors='*' -p build/dev "$1" 2>&1) && return 0
+  printf '%s\n' "$said" | grep -vE '^[0-9]+ warnings? (generated|treated)|^Suppressed |^Use -'
+  return 1
+}
+
+# The program's own files first, then the tests, as far as the time allows.
+tidy() {
+  local status=0 tidy_seconds=$((ci_seconds - SECONDS))
+  if [ $tidy_seconds -lt $tidy_least_seconds ]; then tidy_seconds=$tidy_least_seconds; fi
+  if [ $tidy_seconds -gt $tidy_most_seconds ]; then tidy_seconds=$tidy_most_seconds; fi
+  rm -f build/tidy-not-reached.log
+  tidy_end=$(($(date +%s) + tidy_seconds))
+  export tidy_end
+  export -f tidy_file
+  python3 - <<'PYTHON' >build/tidy-files.log || return 1
+import json, os
+layers = ["scheduler", "formats", "stages", "pipeline", "tools", "tests", "perf"]
+files = {os.path.relpath(entry["file"]) for entry in json.load(open("build/dev/compile_commands.json"))}
+ours = [f for f in files if f.split(os.sep)[0] in layers]
+print("\n".join(sorted(ours, key=lambda f: (layers.index(f.split(os.sep)[0]), f))))
+PYTHON
+  # shellcheck disable=SC2016  # the inner shell expands it
+  xargs -a build/tidy-files.log -P "$jobs" -n 1 bash -c 'tidy_file "$1"' _ || status=1
+  echo "$(wc -l <build/tidy-files.log) files"
+  if [ -s build/tidy-not-reached.log ]; then
+    echo "not reached within $tidy_seconds s: $(sort build/tidy-not-reached.log | tr '\n' ' ')"
+  fi
+  return $status
+}
+
+# fuzz_target PROGRAM: new inputs stay in the build folder; a crash leaves its input there too.
+fuzz_target() {
+  local name=${1##*/fuzz_}
+  local work=build/fuzz/found/$name
+  mkdir -p "$work"
+  "$1" -max_total_time=$fuzz_seconds -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
+    -artifact_prefix="$work/" "$work" "tests/fuzz/corpus/$name" >"build/fuzz/$name.log" 2>&1 ||
+    { tail -n 60 "build/fuzz/$name.log"; return 1; }
+  grep 'number_of_executed_units' "build/fuzz/$name.log"
+}
+
+fuzz() {
+  local target found=0
+  phase 'fuzz: build' configure_and_build fuzz
+  for target in build/fuzz/tests/fuzz/fuzz_*; do
+    if ! [ -x "$target" ] || [ -d "$target" ]; then continue; fi
+    found=1
+    check "fuzz: ${target##*/fuzz_}" fuzz_target "$target"
+  done
+  if [ $found = 0 ]; then fail 'fuzz: there is no target'; fi
+}
+
+summary() {
+  printf '\n'
+  if [ ${#failures[@]} -gt 0 ]; then printf 'failed: %s\n' "${failures[@]}"; fi
+  printf 'all phases: %d s\n' "$SECONDS"
+  printf '%d passed, %d failed' $passed $failed
+  if [ $skipped -gt 0 ]; then printf ', %d skipped' $skipped; fi
+  printf '\n'
+  if [ $failed -gt 0 ]; then exit 1; fi
+}
+
+# Nothing can be built without the tools, so this one failure ends the run.
+phase 'setup' tools/setup.sh --dev
+if [ $failed -gt 0 ]; then summary; fi
+
+ccache_dir=${CCACHE_DIR:-${HOME:-/nonexistent}/.cache/ccache}
+if ! mkdir -p "$ccache_dir" 2>/dev/null || ! [ -w "$ccache_dir" ]; then
+  export CCACHE_DIR=$PWD/build/ccache
+fi
+
+build_and_test dev
+if [ "$mode" = --ci ]; then
+  check 'format' format_check
+  build_and_test asan
+  build_and_test tsan
+  fuzz
+  check 'clang-tidy' tidy
+fi
+summary
