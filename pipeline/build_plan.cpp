@@ -106,6 +106,7 @@ Recipe recipe_for(const BuildOptions& options, const Survey& survey,
   recipe.sampling_zoom = survey.sampling_zoom;
   recipe.min_zoom = options.mesh.min_zoom;
   recipe.max_zoom = survey.max_zoom;
+  recipe.source_crs = options.input.source_crs;
   recipe.resampling = options.input.resampling;
   recipe.reduction = options.mesh.reduction;
   recipe.voids = options.mesh.voids;

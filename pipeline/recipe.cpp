@@ -144,6 +144,7 @@ std::string write_recipe(const Recipe& recipe) {
       {"sampling_zoom", recipe.sampling_zoom},
       {"min_zoom", recipe.min_zoom},
       {"max_zoom", recipe.max_zoom},
+      {"source_crs", recipe.source_crs},
       {"resampling", name_of(recipe.resampling)},
       {"reduce", name_of(recipe.reduction)},
       {"nodata", name_of(recipe.voids)},
@@ -165,6 +166,7 @@ Result<Recipe> parse_recipe(const std::string& text) {
   read_member(object, "sampling_zoom", recipe.sampling_zoom, problem);
   read_member(object, "min_zoom", recipe.min_zoom, problem);
   read_member(object, "max_zoom", recipe.max_zoom, problem);
+  read_member(object, "source_crs", recipe.source_crs, problem);
   read_named(object, "resampling", resampling_named, recipe.resampling, problem);
   read_named(object, "reduce", reduction_named, recipe.reduction, problem);
   read_named(object, "nodata", void_policy_named, recipe.voids, problem);

@@ -24,6 +24,7 @@ struct Recipe {
   std::int32_t sampling_zoom = 0;
   std::int32_t min_zoom = 0;
   std::int32_t max_zoom = 0;
+  std::string source_crs;  // in place of the inputs' own; empty: their own
   Resampling resampling = Resampling::kBilinear;
   Reduction reduction = Reduction::kMean;
   VoidPolicy voids;

@@ -25,7 +25,8 @@ enum class HausdorffMode { kSkipped, kMeasured };
 struct VerifyOptions {
   // Rasters in order of priority; without any, heights are not compared with a source.
   std::vector<std::string> sources = {};
-  std::string source_crs = {};  // overrides the sources' CRS when not empty
+  // Overrides the sources' CRS. DEFAULT: what the set was built with, else the sources' own.
+  std::string source_crs = {};
   // REQUIRES sources. DEFAULT: skipped.
   HausdorffMode hausdorff = HausdorffMode::kSkipped;
   std::int32_t threads = 1;

@@ -92,6 +92,7 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
     describe_inputs(survey);  // an input that cannot be opened is told before work starts
     return std::make_unique<SampledPosts>(options, scheme);
   }
+  if (survey.source_crs.empty()) survey.source_crs = recipe->source_crs;
   survey.resampling = recipe->resampling;
   survey.reduction = recipe->reduction;
   survey.scheme = scheme;

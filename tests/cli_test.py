@@ -170,6 +170,9 @@ class Cli(unittest.TestCase):
         done = run("build", bare, "-o", self.root / "d2", "--source-crs", "EPSG:32632",
                    "--max-zoom", "4")
         self.assertEqual(done.returncode, 0, done.stderr)
+        # The set remembers the CRS it was told.
+        done = run("verify", self.root / "d2", "--source", bare)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
     def test_unwritable_output_is_named(self):
         blocked = self.root / "a-file"
