@@ -26,6 +26,7 @@ class FileHandle {
   ~FileHandle() {
     if (is_open()) ::close(descriptor_);
   }
+  FileHandle(FileHandle&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
   FileHandle(const FileHandle&) = delete;
   FileHandle& operator=(const FileHandle&) = delete;
 
@@ -49,12 +50,76 @@ int write_all(int descriptor, std::span<const std::uint8_t> bytes) {
   return 0;
 }
 
+enum class Sync { kNo, kYes };
+
 // 0 or errno.
-int write_and_close(const std::string& path, std::span<const std::uint8_t> bytes) {
+int write_and_close(const std::string& path, std::span<const std::uint8_t> bytes, Sync sync) {
   FileHandle file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
   if (!file.is_open()) return errno;
   if (const int error = write_all(file.descriptor(), bytes); error != 0) return error;
+  if (sync == Sync::kYes && ::fsync(file.descriptor()) != 0) return errno;
   return file.close();
+}
+
+// 0 or errno. A renamed file has its new name after a power cut only when its folder was synced.
+int sync_folder(const std::filesystem::path& folder) {
+  FileHandle handle(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!handle.is_open() || ::fsync(handle.descriptor()) != 0) return errno;
+  return handle.close();
+}
+
+void write_and_rename(const std::filesystem::path& path, std::span<const std::uint8_t> bytes,
+                      Sync sync) {
+  const std::string temporary = path.string() + kTemporarySuffix;
+  int error = write_and_close(temporary, bytes, sync);
+  if (error == 0 && ::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
+  if (error != 0) ::unlink(temporary.c_str());
+  if (error == 0 && sync == Sync::kYes) {
+    error = sync_folder(path.has_parent_path() ? path.parent_path() : ".");
+  }
+  if (error == 0) return;
+  throw IoError("cannot write", path.string(), text_of_errno(error), remedy_for_errno(error));
+}
+
+// An open regular file, or why it is none.
+struct OpenedFile {
+  FileHandle file;
+  std::uint64_t size_bytes = 0;
+  std::string cause;
+};
+
+OpenedFile open_regular_file(const std::filesystem::path& path) {
+  // Not blocking, so that a named pipe is refused below instead of waited for.
+  OpenedFile opened = {FileHandle(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)), 0, ""};
+  struct stat status {};
+  if (!opened.file.is_open() || ::fstat(opened.file.descriptor(), &status) != 0) {
+    opened.cause = text_of_errno(errno);
+  } else if (!S_ISREG(status.st_mode)) {
+    opened.cause = "it is no regular file";
+  } else {
+    opened.size_bytes = static_cast<std::uint64_t>(status.st_size);
+  }
+  return opened;
+}
+
+Error cannot_read(const std::filesystem::path& path, const std::string& cause) {
+  return Error{fmt::format("cannot read {}: {}", path.string(), cause)};
+}
+
+// Reads until `bytes` is full; an empty string, or what went wrong.
+std::string read_all(int descriptor, std::uint64_t offset, std::span<std::uint8_t> bytes) {
+  std::size_t at = 0;
+  while (at < bytes.size()) {
+    const ssize_t got =
+        ::pread(descriptor, bytes.data() + at, bytes.size() - at, static_cast<off_t>(offset + at));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return text_of_errno(errno);
+    if (got == 0) {
+      return fmt::format("it ends at byte {} of {}", offset + at, offset + bytes.size());
+    }
+    at += static_cast<std::size_t>(got);
+  }
+  return "";
 }
 
 }  // namespace
@@ -86,39 +151,40 @@ std::string remedy_for_errno(int error_number) {
 }
 
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
-  const std::string temporary = path.string() + kTemporarySuffix;
-  int error = write_and_close(temporary, bytes);
-  if (error == 0 && ::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
-  if (error == 0) return;
-  ::unlink(temporary.c_str());
-  throw IoError("cannot write", path.string(), text_of_errno(error), remedy_for_errno(error));
+  write_and_rename(path, bytes, Sync::kNo);
+}
+
+void write_file_durably(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
+  write_and_rename(path, bytes, Sync::kYes);
 }
 
 Result<std::vector<std::uint8_t>> read_file_bytes(const std::filesystem::path& path,
                                                   std::size_t limit_bytes) {
-  const auto failed = [&path](const std::string& cause) {
-    return Error{fmt::format("cannot read {}: {}", path.string(), cause)};
-  };
-  // Not blocking, so that a named pipe is refused below instead of waited for.
-  const FileHandle file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (!file.is_open()) return failed(text_of_errno(errno));
-  struct stat status {};
-  if (::fstat(file.descriptor(), &status) != 0) return failed(text_of_errno(errno));
-  if (!S_ISREG(status.st_mode)) return failed("it is no regular file");
-  if (std::cmp_greater(status.st_size, limit_bytes)) {
-    return failed(
-        fmt::format("it has {} bytes, more than the {} allowed here", status.st_size, limit_bytes));
+  const OpenedFile opened = open_regular_file(path);
+  if (!opened.cause.empty()) return cannot_read(path, opened.cause);
+  if (std::cmp_greater(opened.size_bytes, limit_bytes)) {
+    return cannot_read(path, fmt::format("it has {} bytes, more than the {} allowed here",
+                                         opened.size_bytes, limit_bytes));
   }
-  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(status.st_size));
-  std::size_t at = 0;
-  while (at < bytes.size()) {
-    const ssize_t got = ::read(file.descriptor(), bytes.data() + at, bytes.size() - at);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return failed(text_of_errno(errno));
-    if (got == 0) return failed(fmt::format("it ends at byte {} of {}", at, bytes.size()));
-    at += static_cast<std::size_t>(got);
-  }
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(opened.size_bytes));
+  const std::string cause = read_all(opened.file.descriptor(), 0, bytes);
+  if (!cause.empty()) return cannot_read(path, cause);
   return bytes;
+}
+
+Result<std::vector<std::uint8_t>> read_file_range(const std::filesystem::path& path,
+                                                  std::uint64_t offset, std::size_t bytes) {
+  const OpenedFile opened = open_regular_file(path);
+  if (!opened.cause.empty()) return cannot_read(path, opened.cause);
+  // Before any memory is taken for it.
+  if (offset > opened.size_bytes || bytes > opened.size_bytes - offset) {
+    return cannot_read(path, fmt::format("it has {} bytes, too few for {} at byte {}",
+                                         opened.size_bytes, bytes, offset));
+  }
+  std::vector<std::uint8_t> content(bytes);
+  const std::string cause = read_all(opened.file.descriptor(), offset, content);
+  if (!cause.empty()) return cannot_read(path, cause);
+  return content;
 }
 
 }  // namespace qmpipe

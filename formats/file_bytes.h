@@ -19,9 +19,16 @@ inline constexpr const char* kTemporarySuffix = ".qmpipe-tmp";
 // remedy; then nothing is left behind.
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 
+// The same, and on return the file and its name are on the disk: it outlives a power cut.
+void write_file_durably(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+
 // Refuses what is no regular file, cannot be read or is larger than limit_bytes.
 Result<std::vector<std::uint8_t>> read_file_bytes(const std::filesystem::path& path,
                                                   std::size_t limit_bytes);
+
+// Refuses as read_file_bytes() does, and when the file ends before offset + bytes.
+Result<std::vector<std::uint8_t>> read_file_range(const std::filesystem::path& path,
+                                                  std::uint64_t offset, std::size_t bytes);
 
 // "free some space or choose another disk" and the like, for an errno value; empty for reasons that
 // explain themselves.

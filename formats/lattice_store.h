@@ -29,6 +29,8 @@ class LatticeStore {
   // lattice read as void. REQUIRES: out.size() == window.size().
   virtual void read(const Lattice& lattice, const PostWindow& window,
                     std::span<float> out) const = 0;
+  // What was put before the call is safe on disk after it, where the store is on disk.
+  virtual void seal() = 0;
   virtual std::int64_t memory_bytes() const = 0;
 };
 

@@ -21,7 +21,7 @@ void store_little_endian(std::uint8_t* to, T value) {
 // REQUIRES: sizeof(T) readable bytes at `from`.
 template <class T>
 requires std::is_arithmetic_v<T> T load_little_endian(const std::uint8_t* from) {
-  std::array<std::uint8_t, sizeof(T)> bytes;
+  std::array<std::uint8_t, sizeof(T)> bytes{};
   std::memcpy(bytes.data(), from, sizeof(T));
   if constexpr (std::endian::native == std::endian::big) std::reverse(bytes.begin(), bytes.end());
   return std::bit_cast<T>(bytes);

@@ -14,7 +14,7 @@ inline constexpr std::size_t kExtensionHeaderBytes = 5;
 inline constexpr std::uint8_t kNormalsId = 1;
 inline constexpr std::uint8_t kWaterMaskId = 2;
 inline constexpr std::uint8_t kMetadataId = 4;
-inline constexpr std::size_t kWaterMaskTexels = 256 * 256;
+inline constexpr std::size_t kWaterMaskTexels = std::size_t{256} * 256;
 
 constexpr std::size_t index_bytes(std::size_t vertex_count) {
   return vertex_count > kForbiddenVertexCount ? 4 : 2;

@@ -5,16 +5,18 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <set>
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/folder_sink.h"
 #include "pipeline/build_plan.h"
+#include "pipeline/memory_share.h"
+#include "pipeline/run_folder.h"
 #include "pipeline/survey.h"
 #include "pipeline/tile_graph.h"
 #include "pipeline/version.h"
-#include "scheduler/memory_budget.h"
 
 namespace qmpipe {
 namespace {
@@ -56,29 +58,6 @@ void note_assumptions(const std::vector<RasterInfo>& sources, Progress& progress
         "heights above the WGS84 ellipsoid (heights above sea level will stand off by the geoid's "
         "height, up to 100 m)");
   }
-}
-
-MemoryPlan share_memory(const BuildOptions& options, const SurveyOptions& survey,
-                        const std::vector<RasterInfo>& sources) {
-  MemoryNeeds needs{.threads = options.run.threads};
-  const std::int32_t zoom = chosen_sampling_zoom(survey, sources);
-  needs.lattice_bytes = expected_lattice_bytes(survey.scheme, zoom, sources);
-  constexpr std::int64_t kBlockBytes = 256LL * 256 * 4;
-  needs.tiles = needs.lattice_bytes / kBlockBytes;
-  for (const RasterInfo& source : sources) {
-    // GDAL keeps blocks in the band's type, eight bytes a pixel at most.
-    needs.source_block_bytes =
-        std::max(needs.source_block_bytes, source.block_width * source.block_height * 8);
-  }
-  const MemoryPlan plan = plan_memory(options.run.memory_bytes, needs);
-  if (!plan.fits) {
-    throw UsageError(fmt::format(
-        "--memory {} is too little for this work (sampling zoom {}): it needs {} MiB or more; a "
-        "smaller --max-zoom does not lessen it, a smaller input does",
-        bytes_text(options.run.memory_bytes), zoom,
-        (plan.smallest_limit_bytes + (1LL << 20U) - 1) >> 20U));
-  }
-  return plan;
 }
 
 void require_data(const Survey& survey) {
@@ -178,13 +157,24 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   SurveyOptions to_survey = survey_options(options);
   const std::vector<RasterInfo> sources = describe_inputs(to_survey);
   note_assumptions(sources, progress);
-  const MemoryPlan memory = share_memory(options, to_survey, sources);
+  const MemoryShare share = share_memory(options.run.memory_bytes, to_survey, sources);
+  const MemoryPlan& memory = share.plan;
   set_raster_cache_bytes(memory.raster_cache_bytes);
   to_survey.threads = memory.sampling_threads;
   // Opened before hours of work, so that a folder that cannot be used is known at once.
   std::unique_ptr<TileSink> sink;
   if (!options.run.dry_run) sink = open_folder_sink(options.output.path, options.output.overwrite);
 
+  // Outlives the survey's store, which lies in it.
+  std::optional<RunFolder> run_folder;
+  if (share.store_bytes > 0) {
+    run_folder.emplace(options.output.path);
+    to_survey.store_folder = run_folder->path();
+    to_survey.last_memory_zoom = share.last_memory_zoom;
+    progress.note(fmt::format("the lattice of the zooms below {} is kept in {}: at most {} of disk",
+                              share.last_memory_zoom, run_folder->path().string(),
+                              bytes_text(share.store_bytes)));
+  }
   const Survey survey = run_survey(to_survey, progress);
   require_data(survey);
   const BuildPlan plan = plan_build(options, survey);

@@ -53,7 +53,7 @@ struct EncodeOptions {
 struct RunOptions {
   // DEFAULT: as many as the machine has cores.
   std::int32_t threads = 1;
-  // For the whole process; 0: no limit beyond what the work needs. DEFAULT: 0.
+  // For the whole process; 0: nine tenths of the machine's memory. DEFAULT: 0.
   std::int64_t memory_bytes = 0;
   bool dry_run = false;
 };

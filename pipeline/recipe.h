@@ -49,6 +49,6 @@ Result<VoidPolicy> void_policy_named(const std::string& name);
 
 // JSON text of an object, keys sorted; read back equal.
 std::string write_recipe(const Recipe& recipe);
-Result<Recipe> parse_recipe(const std::string& json);
+Result<Recipe> parse_recipe(const std::string& text);
 
 }  // namespace qmpipe

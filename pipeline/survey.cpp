@@ -11,6 +11,8 @@
 #include <set>
 
 #include "formats/errors.h"
+#include "formats/hdf5_lattice_store.h"
+#include "formats/tiered_lattice_store.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
@@ -35,30 +37,57 @@ void for_each_index(tbb::task_arena& arena, std::size_t count, const Body& body)
   arena.execute([&] { tbb::parallel_for(std::size_t{0}, count, body); });
 }
 
+// Columns first_x .. first_x + width - 1 (they wrap) and rows first_y .. first_y + height - 1.
+struct BlockSpan {
+  std::int32_t first_x = 0;
+  std::int32_t first_y = 0;
+  std::int32_t width = 0;
+  std::int32_t height = 0;
+};
+
+BlockSpan covered_span(const Lattice& lattice, const RasterInfo& source) {
+  const RectangleDeg& box = source.bounds_deg;
+  const auto block = [](double post) {
+    return static_cast<std::int32_t>(std::floor(post / kBlockPosts));
+  };
+  // A post of slack: bounds of projected rasters come from a finite number of edge points.
+  BlockSpan span;
+  span.first_x = block(lattice.column_at(box.west_deg) - 1);
+  span.width = std::min(block(lattice.column_at(box.east_deg) + 1) - span.first_x + 1,
+                        lattice.columns() / kBlockPosts);
+  span.first_y = std::max(0, block(lattice.row_at(box.south_deg) - 1));
+  const std::int32_t last_y =
+      std::min((lattice.rows() - 1) / kBlockPosts, block(lattice.row_at(box.north_deg) + 1));
+  span.height = std::max(0, last_y - span.first_y + 1);
+  return span;
+}
+
 std::vector<BlockKey> covered_blocks(const TilingScheme& scheme, std::int32_t zoom,
                                      const std::vector<RasterInfo>& sources) {
   const Lattice lattice(scheme, zoom);
+  const std::int32_t columns = scheme.columns(zoom);
   std::set<BlockKey> blocks;
   for (const RasterInfo& source : sources) {
-    const RectangleDeg& box = source.bounds_deg;
-    // A post of slack: bounds of projected rasters come from a finite number of edge points.
-    const auto block = [](double post) {
-      return static_cast<std::int32_t>(std::floor(post / kBlockPosts));
-    };
-    const std::int32_t first_x = block(lattice.column_at(box.west_deg) - 1);
-    const std::int32_t last_x =
-        std::min(block(lattice.column_at(box.east_deg) + 1), first_x + scheme.columns(zoom) - 1);
-    const std::int32_t first_y = std::max(0, block(lattice.row_at(box.south_deg) - 1));
-    const std::int32_t last_y =
-        std::min(scheme.rows(zoom), block(lattice.row_at(box.north_deg) + 1));
-    for (std::int32_t y = first_y; y <= last_y; ++y) {
-      for (std::int32_t x = first_x; x <= last_x; ++x) {
-        const std::int32_t columns = scheme.columns(zoom);
+    const BlockSpan span = covered_span(lattice, source);
+    for (std::int32_t y = span.first_y; y < span.first_y + span.height; ++y) {
+      for (std::int32_t x = span.first_x; x < span.first_x + span.width; ++x) {
         blocks.insert({.zoom = zoom, .x = (x % columns + columns) % columns, .y = y});
       }
     }
   }
   return {blocks.begin(), blocks.end()};
+}
+
+std::unique_ptr<LatticeStore> make_store(const SurveyOptions& options, std::int32_t max_zoom) {
+  auto memory = make_memory_lattice_store(options.scheme, max_zoom);
+  if (options.last_memory_zoom >= max_zoom) return memory;
+  auto disk = open_hdf5_lattice_store(options.store_folder, options.scheme, {.max_zoom = max_zoom});
+  if (!disk) {
+    throw IoError("cannot keep the lattice in", options.store_folder.string(), disk.error().message,
+                  "remove the folder and run again");
+  }
+  return make_tiered_lattice_store(std::move(memory), options.last_memory_zoom,
+                                   std::move(disk.value()));
 }
 
 // The blocks of the next coarser zoom that may have a valid post where the given ones do: a coarse
@@ -236,7 +265,7 @@ Survey Surveyor::run() {
   survey_.scheme = options_.scheme;
   survey_.sampling_zoom = chosen_sampling_zoom(options_, survey_.sources);
   survey_.max_zoom = options_.max_zoom < 0 ? survey_.sampling_zoom : options_.max_zoom;
-  survey_.store = make_memory_lattice_store(survey_.scheme, survey_.sampling_zoom);
+  survey_.store = make_store(options_, survey_.sampling_zoom);
   survey_.pole_heights.resize(static_cast<std::size_t>(survey_.sampling_zoom) + 1);
   survey_.tiles.resize(static_cast<std::size_t>(survey_.max_zoom) + 1);
 
@@ -278,13 +307,16 @@ Survey run_survey(const SurveyOptions& options, Progress& progress) {
   return Surveyor(options, progress).run();
 }
 
-std::int64_t expected_lattice_bytes(const TilingScheme& scheme, std::int32_t sampling_zoom,
-                                    const std::vector<RasterInfo>& sources) {
-  const auto blocks =
-      static_cast<std::int64_t>(covered_blocks(scheme, sampling_zoom, sources).size());
-  // Coarser zooms add a third, and a block for each zoom's rounding.
-  const auto block_bytes = static_cast<std::int64_t>(kBlockSize * sizeof(float));
-  return (blocks + blocks / 3 + 4 * sampling_zoom) * block_bytes;
+std::int64_t expected_blocks(const TilingScheme& scheme, std::int32_t zoom,
+                             const std::vector<RasterInfo>& sources) {
+  // Counted, not listed: a zoom may be asked for that has more blocks than any memory holds keys.
+  const Lattice lattice(scheme, zoom);
+  std::int64_t blocks = 0;
+  for (const RasterInfo& source : sources) {
+    const BlockSpan span = covered_span(lattice, source);
+    blocks += static_cast<std::int64_t>(span.width) * span.height;
+  }
+  return blocks;
 }
 
 }  // namespace qmpipe

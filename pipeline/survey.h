@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -30,6 +31,10 @@ struct SurveyOptions {
   // Deepest zoom for which tiles are listed; -1: the sampling zoom.
   std::int32_t max_zoom = -1;
   std::int32_t threads = 1;
+  // Deeper zooms than this are kept on disk, compressed; -1 keeps all there. DEFAULT: all in memory.
+  std::int32_t last_memory_zoom = kMaxZoom;
+  // Where the store on disk lives; needed when a zoom is kept there. It must be empty.
+  std::filesystem::path store_folder = {};
 };
 
 // A tile with at least one valid post, and the range of its valid posts (257 x 257, sides included).
@@ -62,8 +67,8 @@ std::vector<RasterInfo> describe_inputs(const SurveyOptions& options);
 
 Survey run_survey(const SurveyOptions& options, Progress& progress);
 
-// What the lattice of these sources will take at most.
-std::int64_t expected_lattice_bytes(const TilingScheme& scheme, std::int32_t sampling_zoom,
-                                    const std::vector<RasterInfo>& sources);
+// How many blocks of one zoom these sources touch at most.
+std::int64_t expected_blocks(const TilingScheme& scheme, std::int32_t zoom,
+                             const std::vector<RasterInfo>& sources);
 
 }  // namespace qmpipe

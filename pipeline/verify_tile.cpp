@@ -307,9 +307,9 @@ CheckedTile check_tile(const TilingScheme& scheme, const TileKey& key,
   if (!plain) return refuse(FindingKind::kUnreadableTile, plain.error().message);
   Result<QuantizedMesh> mesh = decode(*plain);
   if (!mesh) {
-    return refuse(has_forbidden_count(*plain) ? FindingKind::kVertexCount
-                                              : FindingKind::kUnreadableTile,
-                  mesh.error().message);
+    return refuse(
+        has_forbidden_count(*plain) ? FindingKind::kVertexCount : FindingKind::kUnreadableTile,
+        mesh.error().message);
   }
   checked.mesh = std::move(*mesh);
   checked.findings = check_mesh(scheme, key, *checked.mesh, rule);

@@ -81,8 +81,7 @@ void reduce_block(const LatticeStore& store, const TilingScheme& scheme, std::in
       std::fill(row, row + kBlockPosts, kVoid);
       continue;
     }
-    const float* centre =
-        heights_m.data() + static_cast<std::ptrdiff_t>(2 * j + 1) * window.width_posts + 1;
+    const float* centre = heights_m.data() + (std::ptrdiff_t{2} * j + 1) * window.width_posts + 1;
     for (std::int32_t i = 0; i < kBlockPosts; ++i) {
       row[i] = reduced({.centre = centre + 2 * i, .row_stride = window.width_posts}, reduction);
     }

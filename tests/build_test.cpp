@@ -12,6 +12,7 @@
 
 #include "formats/errors.h"
 #include "formats/tile_set.h"
+#include "pipeline/memory_share.h"
 #include "pipeline/verify.h"
 #include "tests/raster_fixture.h"
 #include "tests/temporary_folder.h"
@@ -110,6 +111,41 @@ TEST_F(BuildTest, BytesDoNotDependOnThreadsOrMemory) {
     run(other);
     EXPECT_EQ(contents(other), reference);
   }
+}
+
+TEST_F(BuildTest, LatticeOnDiskGivesTheSameBytesAndLeavesNothing) {
+  RasterFixture fixture = hilly_raster(2, 10, 45, 0.0008);
+  fixture.width = 4000;
+  fixture.height = 3000;
+  fixture.type = "Int16";
+  fixture.creation_options = {"TILED=YES", "COMPRESS=DEFLATE"};
+  BuildOptions options = options_for({write(fixture)}, "in-memory");
+  run(options);
+  const auto reference = contents(options);
+  options.output.path = folder_.path() / "on-disk/";
+  options.run.memory_bytes = 260LL << 20U;
+  const BuildResult result = run(options);
+  EXPECT_EQ(contents(options), reference);
+  EXPECT_LT(result.report.expected_peak_bytes, options.run.memory_bytes);
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "on-disk.qmpipe-run"));
+}
+
+TEST(MemoryShare, LessMemoryMovesTheDeepestZoomsToDiskFirst) {
+  RasterInfo source;
+  source.bounds_deg = {.west_deg = -36, .south_deg = 15, .east_deg = 43, .north_deg = 90};
+  source.pixel_deg = 0.01;
+  source.block_width = 256;
+  source.block_height = 256;
+  const SurveyOptions survey;
+  std::int32_t last_before = kMaxZoom;
+  for (const std::int64_t mebibytes : {8192, 2048, 1024, 512, 300}) {
+    const MemoryShare share = share_memory(mebibytes << 20U, survey, {source});
+    EXPECT_LE(share.plan.expected_peak_bytes, mebibytes << 20U);
+    EXPECT_LE(share.last_memory_zoom, last_before);
+    last_before = share.last_memory_zoom;
+  }
+  EXPECT_LT(last_before, chosen_sampling_zoom(survey, {source}));
+  EXPECT_THROW(share_memory(50LL << 20U, survey, {source}), UsageError);
 }
 
 TEST_F(BuildTest, VerifyFindsNothingInAnyScheme) {
@@ -220,9 +256,9 @@ TEST_F(BuildTest, TooLittleMemoryIsRefusedWithTheLeastThatWorks) {
     FAIL() << "a build in 1 MiB";
   } catch (const UsageError& error) {
     const std::string text = error.what();
-    const auto at = text.find("it needs ");
+    const auto at = text.find(" needs ");
     ASSERT_NE(at, std::string::npos) << text;
-    options.run.memory_bytes = std::stoll(text.substr(at + 9)) << 20U;
+    options.run.memory_bytes = std::stoll(text.substr(at + 7)) << 20U;
   }
   run(options);
   expect_sound(options);

@@ -143,6 +143,8 @@ class Cli(unittest.TestCase):
         self.fails(2, "build", self.dem, "-o", out, "--min-zoom", "5", "--max-zoom", "2",
                    says=["--max-zoom"])
         self.fails(2, "build", self.dem, "-o", out, "--max-zoom", "99")
+        # More blocks than could ever be listed: refused by arithmetic, at once.
+        self.fails(2, "build", self.dem, "-o", out, "--max-zoom", "21", says=["MiB or more"])
         self.fails(2, "synth", "-o", self.root / "x.tif", "--size", "12", "--bounds", "0,0,1,1")
         self.assertFalse(out.exists())
 

@@ -79,7 +79,8 @@ void print_effective(const BuildOptions& options) {
       name_of(mesh.voids), options.encode.normals ? "yes" : "no",
       options.encode.gzip_level ? std::to_string(*options.encode.gzip_level) : "none",
       options.run.threads,
-      options.run.memory_bytes == 0 ? "no limit" : bytes_text(options.run.memory_bytes));
+      options.run.memory_bytes == 0 ? "nine tenths of the machine's"
+                                    : bytes_text(options.run.memory_bytes));
   std::fputs(text.c_str(), stderr);
 }
 
@@ -185,7 +186,8 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
   command.add_option("--threads", options.run.threads, "Threads to work with (default: all cores)");
   command
       .add_option("--memory", arguments.memory,
-                  "Most memory for the whole process, such as 512M or 2G; 0: what the work needs")
+                  "Most memory for the whole process, such as 512M or 2G; 0: nine tenths of the "
+                  "machine's")
       ->capture_default_str()
       ->type_name("SIZE");
   command.add_flag("--dry-run", options.run.dry_run,

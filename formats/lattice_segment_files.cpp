@@ -1,0 +1,82 @@
+#include "formats/lattice_segment_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "formats/errors.h"
+#include "formats/file_bytes.h"
+
+namespace qmpipe {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kPrefix = "lattice-";
+constexpr std::string_view kSuffix = ".h5";
+
+std::optional<std::int32_t> segment_number(const fs::path& path) {
+  const std::string name = path.filename().string();
+  if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) return std::nullopt;
+  const char* end = name.data() + name.size() - kSuffix.size();
+  std::int32_t number = 0;
+  const auto parsed = std::from_chars(name.data() + kPrefix.size(), end, number);
+  // One name for one number: nothing else would be found again.
+  if (parsed.ec != std::errc() || parsed.ptr != end || number < 0 ||
+      segment_path(path.parent_path(), number) != path) {
+    return std::nullopt;
+  }
+  return number;
+}
+
+bool is_torn_segment(const fs::path& path) {
+  const std::string name = path.filename().string();
+  return name.starts_with(kPrefix) && name.ends_with(kTemporarySuffix);
+}
+
+[[noreturn]] void throw_io_error(const char* what_failed, const fs::path& path,
+                                 const std::error_code& code) {
+  throw IoError(what_failed, path.string(), code.message(), remedy_for_errno(code.value()));
+}
+
+std::vector<fs::path> files_of(const fs::path& folder) {
+  std::error_code code;
+  std::vector<fs::path> files;
+  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    files.push_back(it->path());
+  }
+  if (code) throw_io_error("cannot list the folder", folder, code);
+  return files;
+}
+
+}  // namespace
+
+fs::path segment_path(const fs::path& folder, std::int32_t number) {
+  return folder / fmt::format("{}{:06}{}", kPrefix, number, kSuffix);
+}
+
+std::vector<std::int32_t> segment_numbers(const fs::path& folder) {
+  std::vector<std::int32_t> numbers;
+  for (const fs::path& file : files_of(folder)) {
+    if (const auto number = segment_number(file)) numbers.push_back(*number);
+  }
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
+void prepare_segment_folder(const fs::path& folder) {
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code) throw_io_error("cannot create the folder", folder, code);
+  for (const fs::path& file : files_of(folder)) {
+    if (is_torn_segment(file)) fs::remove(file, code);
+    if (code) throw_io_error("cannot remove", file, code);
+  }
+}
+
+}  // namespace qmpipe

@@ -1,0 +1,26 @@
+// Which zooms' lattices stay in memory, and how the rest of the budget is shared out.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "pipeline/survey.h"
+#include "scheduler/memory_budget.h"
+
+namespace qmpipe {
+
+struct MemoryShare {
+  MemoryPlan plan;
+  // Deeper zooms are kept on disk.
+  std::int32_t last_memory_zoom = 0;
+  // What they take there at most (uncompressed; terrain packs to about half).
+  std::int64_t store_bytes = 0;
+};
+
+// As many zooms as fit half the limit stay in memory, coarse ones first; where no division leaves
+// enough for the work, throws UsageError with the least limit that would do.
+// `limit_bytes` 0: nine tenths of the machine's memory.
+MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
+                         const std::vector<RasterInfo>& sources);
+
+}  // namespace qmpipe
