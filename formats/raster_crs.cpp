@@ -112,7 +112,7 @@ OGRSpatialReference find_crs(GDALDataset& dataset, const std::string& path,
   } else if (std::string(dataset.GetDriver()->GetDescription()) == "netCDF" &&
              has_degree_axes(dataset) && extent_looks_like_degrees(dataset)) {
     crs.importFromEPSG(4326);
-    assumptions.push_back(
+    assumptions.emplace_back(
         "the file names no CRS; its axes are longitude and latitude, so EPSG:4326"
         " (WGS84) is taken");
   } else {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gdal_priv.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -148,16 +149,13 @@ std::vector<MapPoint> sample_points(const Affine& affine, const RasterInfo& info
 
 // Then no transformation need be called at all.
 bool leaves_degrees_alone(const CrsTransform& transform, std::span<const MapPoint> points) {
-  for (const MapPoint& point : points) {
-    if (std::abs(point.y) > 90) continue;
+  return std::all_of(points.begin(), points.end(), [&transform](const MapPoint& point) {
+    if (std::abs(point.y) > 90) return true;
     const LonLat at{.longitude_deg = std::remainder(point.x, 360.0), .latitude_deg = point.y};
     const std::optional<MapPoint> same = transform.forward(at);
-    if (!same || std::abs(same->y - at.latitude_deg) > kSamePlaceDeg ||
-        std::abs(std::remainder(same->x - at.longitude_deg, 360.0)) > kSamePlaceDeg) {
-      return false;
-    }
-  }
-  return true;
+    return same && std::abs(same->y - at.latitude_deg) <= kSamePlaceDeg &&
+           std::abs(std::remainder(same->x - at.longitude_deg, 360.0)) <= kSamePlaceDeg;
+  });
 }
 
 }  // namespace

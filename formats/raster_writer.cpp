@@ -105,6 +105,7 @@ void RasterWriter::write_block(const PixelWindow& window, std::span<const std::i
   const int width = static_cast<int>(window.width);
   const int height = static_cast<int>(window.height);
   // GDAL's interface takes a buffer it may write to, but writing a raster only reads it.
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast)
   void* const values = const_cast<std::int16_t*>(heights_m.data());
   const CPLErr result = impl_->dataset->GetRasterBand(1)->RasterIO(
       GF_Write, static_cast<int>(window.column0), static_cast<int>(window.row0), width, height,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <system_error>
+#include <utility>
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
@@ -34,7 +35,7 @@ bool is_in_some_scheme(const TileKey& key) {
 
 class Scanner {
  public:
-  explicit Scanner(const fs::path& folder) : folder_(folder) {}
+  explicit Scanner(fs::path folder) : folder_(std::move(folder)) {}
 
   // Three levels deep at most, so that links in a circle do no harm.
   void run() {

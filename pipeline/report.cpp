@@ -84,6 +84,8 @@ std::string report_table(const BuildReport& report) {
 std::int64_t peak_resident_bytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
+  // glibc declares the field inside a union.
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-union-access)
   return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
 }
 

@@ -125,7 +125,7 @@ class Surveyor {
   void reduce_to(std::vector<BlockKey>& blocks);
   void settle_poles(const std::vector<BlockKey>& blocks, std::int32_t zoom);
   std::optional<float> settle_pole(const std::vector<BlockKey>& blocks, const Lattice& lattice,
-                                   std::int32_t j);
+                                   std::int32_t j) const;
   void list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom);
   SurveyedTile examine(const TileKey& key) const;
 
@@ -174,7 +174,7 @@ void Surveyor::reduce_to(std::vector<BlockKey>& blocks) {
 
 // All posts of a pole row are one point of the globe: they get the mean of those that are valid.
 std::optional<float> Surveyor::settle_pole(const std::vector<BlockKey>& blocks,
-                                           const Lattice& lattice, std::int32_t j) {
+                                           const Lattice& lattice, std::int32_t j) const {
   const std::int32_t zoom = lattice.zoom();
   std::vector<float> block_m(kBlockSize);
   const auto row = block_m.begin() + static_cast<std::ptrdiff_t>(j % kBlockPosts) * kBlockPosts;

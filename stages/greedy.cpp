@@ -36,6 +36,21 @@ struct LessUrgent {
   }
 };
 
+// The middle of the tile's heights, on a step, and how far the farthest lies from it.
+struct HeightRange {
+  double middle_m = 0;
+  double reach_m = 0;
+};
+
+HeightRange height_range(std::span<const float> heights_m, double step_m) {
+  QMPIPE_CHECK(heights_m.size() == kTilePostCount && step_m > 0);
+  const auto [low, high] = std::minmax_element(heights_m.begin(), heights_m.end());
+  QMPIPE_CHECK(std::isfinite(*low) && std::isfinite(*high));
+  const double middle_m = snapped_height(0.5 * (static_cast<double>(*low) + *high), step_m);
+  return {.middle_m = middle_m,
+          .reach_m = std::max(std::abs(*low - middle_m), std::abs(*high - middle_m)) + step_m};
+}
+
 class GreedyInsertion {
  public:
   GreedyInsertion(const TileGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
@@ -84,6 +99,7 @@ class GreedyInsertion {
   std::vector<std::uint8_t> blocked_;   // posts that are vertices already or lie on a fixed side
   // Heights less base_m_: differences of floats near each other lose nothing, so the error of a
   // float sum stays far below a tolerance even in the Himalayas.
+  HeightRange range_;
   double base_m_ = 0;
   std::vector<float> heights_;
   bool curved_ = false;
@@ -100,24 +116,21 @@ GreedyInsertion::GreedyInsertion(const TileGrid& grid, std::span<const float> he
       source_heights_m_(heights_m),
       options_(options),
       mesh_(kQuantizedMax),
-      blocked_(kTilePostCount, 0) {
-  QMPIPE_CHECK(heights_m.size() == kTilePostCount);
-  QMPIPE_CHECK(options.height_step_m > 0 && options.tolerance_m > options.height_step_m / 2);
-  const auto [low, high] = std::minmax_element(heights_m.begin(), heights_m.end());
-  QMPIPE_CHECK(std::isfinite(*low) && std::isfinite(*high));
-  base_m_ = snapped_height(0.5 * (static_cast<double>(*low) + *high), options.height_step_m);
-  heights_.resize(kTilePostCount + WorstPost::kOverread);
+      blocked_(kTilePostCount, 0),
+      range_(height_range(heights_m, options.height_step_m)),
+      base_m_(range_.middle_m),
+      heights_(kTilePostCount + WorstPost::kOverread),
+      curvature_(curvature_terms(grid)) {
+  QMPIPE_CHECK(options.tolerance_m > options.height_step_m / 2);
   for (std::size_t k = 0; k < kTilePostCount; ++k) {
     heights_[k] = static_cast<float>(static_cast<double>(heights_m[k]) - base_m_);
   }
   // What float arithmetic may lose on the way comes off the tolerance, so that the bound is true.
-  const double largest =
-      std::max(std::abs(*low - base_m_), std::abs(*high - base_m_)) + options.height_step_m;
-  const double rounding = 6 * largest * static_cast<double>(std::numeric_limits<float>::epsilon());
+  const double rounding =
+      6 * range_.reach_m * static_cast<double>(std::numeric_limits<float>::epsilon());
   threshold_ =
       static_cast<float>(std::max(options.tolerance_m - rounding, options.tolerance_m / 2));
 
-  curvature_ = curvature_terms(grid);
   curved_ =
       options.curvature == Curvature::kCounts && largest_sagitta_m(grid) > options.tolerance_m / 64;
   if (curved_) {

@@ -160,7 +160,7 @@ void CellFiller::fill_block() {
   const std::int32_t b1 = cell_row(block_.j0 + block_.height_posts - 1);
   constexpr std::int32_t kHalf = kAnchorPosts / 2;
   // Anchors along the northern side of the row of cells in hand, and halfway between them.
-  const auto cells = static_cast<std::size_t>(a1 - a0 + 1);
+  const auto cells = static_cast<std::size_t>(a1 - a0) + 1;
   std::vector<PixelPoint> below(2 * cells + 1);
   std::vector<PixelPoint> beside(cells + 1);
   std::vector<PixelPoint> above(2 * cells + 1);

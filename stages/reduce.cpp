@@ -83,7 +83,8 @@ void reduce_block(const LatticeStore& store, const TilingScheme& scheme, std::in
     }
     const float* centre = heights_m.data() + (std::ptrdiff_t{2} * j + 1) * window.width_posts + 1;
     for (std::int32_t i = 0; i < kBlockPosts; ++i) {
-      row[i] = reduced({.centre = centre + 2 * i, .row_stride = window.width_posts}, reduction);
+      row[i] = reduced({.centre = centre + std::ptrdiff_t{2} * i, .row_stride = window.width_posts},
+                       reduction);
     }
   }
 }
