@@ -21,8 +21,6 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::int32_t kSampleTiles = 6;
-
 void require_sound(const BuildOptions& options) {
   const std::vector<std::string> rules = violated_rules(options);
   if (rules.empty()) return;
@@ -181,7 +179,7 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   const Heightfield heightfield(*survey.store, survey.scheme, options.mesh.voids,
                                 survey.pole_heights);
   BuildResult result;
-  result.estimate = estimate_build(options, plan, heightfield, memory, kSampleTiles);
+  result.estimate = estimate_build(options, plan, heightfield, memory);
   progress.event(estimate_json(result.estimate));
   if (options.run.dry_run) return result;
   progress.note(fmt::format("{} tiles, about {} and {:.0f} s, memory at most {}",

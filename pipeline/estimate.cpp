@@ -1,11 +1,14 @@
 #include "pipeline/estimate.h"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <optional>
 #include <thread>
 
 #include "pipeline/tile_builder.h"
@@ -13,50 +16,80 @@
 namespace qmpipe {
 namespace {
 
-struct Cost {
+constexpr std::size_t kTilesPerSample = 50;
+constexpr std::size_t kFewest = 2;
+constexpr std::size_t kMost = 6;
+
+struct Sample {
+  TileKey key;
   std::int64_t bytes = 0;
   double seconds = 0;
 };
 
-Cost cost_of(const TileKey& key, const TileBuilder& builder, GzipCompressor* compressor) {
+void measure(Sample& sample, const TileBuilder& builder, const std::optional<int>& gzip_level) {
   TileWork work;
-  work.key = key;
+  work.key = sample.key;
   builder.read_window(work);
-  builder.simplify(work, {}, {.key = key});
+  PlannedTile alone;
+  alone.key = sample.key;
+  builder.simplify(work, {}, alone);
   builder.finish(work);
-  builder.encode_bytes(work, compressor);
-  return {.bytes = static_cast<std::int64_t>(work.bytes.size()),
-          .seconds = std::accumulate(work.seconds.begin(), work.seconds.end(), 0.0)};
+  std::optional<GzipCompressor> compressor;
+  if (gzip_level) compressor.emplace(*gzip_level);
+  builder.encode_bytes(work, compressor ? &*compressor : nullptr);
+  sample.bytes = static_cast<std::int64_t>(work.bytes.size());
+  sample.seconds = std::accumulate(work.seconds.begin(), work.seconds.end(), 0.0);
+}
+
+// A few tiles of each zoom, more of a zoom that has many: each is the middle of one of equal parts of
+// the zoom's list.
+std::vector<Sample> choose_samples(const BuildPlan& plan) {
+  std::vector<Sample> samples;
+  for (const auto& keys : plan.keys) {
+    const std::size_t count =
+        std::min(keys.size(), std::clamp(keys.size() / kTilesPerSample, kFewest, kMost));
+    for (std::size_t k = 0; k < count; ++k) {
+      samples.push_back({.key = keys[(2 * k + 1) * keys.size() / (2 * count)]});
+    }
+  }
+  return samples;
+}
+
+ZoomEstimate scaled_up(const std::vector<TileKey>& keys, const std::vector<Sample>& samples) {
+  ZoomEstimate zoom{.zoom = keys.front().zoom, .tiles = static_cast<std::int64_t>(keys.size())};
+  double bytes = 0;
+  double count = 0;
+  for (const Sample& sample : samples) {
+    if (sample.key.zoom != zoom.zoom) continue;
+    bytes += static_cast<double>(sample.bytes);
+    zoom.seconds += sample.seconds;
+    ++count;
+  }
+  const double scale = static_cast<double>(keys.size()) / count;
+  zoom.bytes = static_cast<std::int64_t>(bytes * scale);
+  zoom.seconds *= scale;
+  return zoom;
 }
 
 }  // namespace
 
 Estimate estimate_build(const BuildOptions& options, const BuildPlan& plan,
-                        const Heightfield& heightfield, const MemoryPlan& memory,
-                        std::int32_t sample_tiles) {
+                        const Heightfield& heightfield, const MemoryPlan& memory) {
   const TileBuilder builder(heightfield, plan.recipe);
-  std::optional<GzipCompressor> compressor;
-  if (options.encode.gzip_level) compressor.emplace(*options.encode.gzip_level);
+  std::vector<Sample> samples = choose_samples(plan);
+  tbb::task_arena arena(std::min(options.run.threads, memory.max_in_flight));
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t k) {
+      measure(samples[k], builder, options.encode.gzip_level);
+    });
+  });
   Estimate estimate;
   estimate.expected_peak_bytes = memory.expected_peak_bytes;
   estimate.sampling_zoom = plan.recipe.sampling_zoom;
   double core_s = 0;
   for (const auto& keys : plan.keys) {
     if (keys.empty()) continue;
-    const auto samples = std::min<std::size_t>(keys.size(), static_cast<std::size_t>(sample_tiles));
-    Cost sum;
-    for (std::size_t k = 0; k < samples; ++k) {
-      // The middle of each of `samples` equal parts of the list.
-      const Cost cost = cost_of(keys[(2 * k + 1) * keys.size() / (2 * samples)], builder,
-                                compressor ? &*compressor : nullptr);
-      sum.bytes += cost.bytes;
-      sum.seconds += cost.seconds;
-    }
-    const double scale = static_cast<double>(keys.size()) / static_cast<double>(samples);
-    ZoomEstimate zoom{.zoom = keys.front().zoom,
-                      .tiles = static_cast<std::int64_t>(keys.size()),
-                      .bytes = static_cast<std::int64_t>(static_cast<double>(sum.bytes) * scale),
-                      .seconds = sum.seconds * scale};
+    const ZoomEstimate zoom = scaled_up(keys, samples);
     estimate.tiles += zoom.tiles;
     estimate.bytes += zoom.bytes;
     core_s += zoom.seconds;

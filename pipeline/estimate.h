@@ -28,10 +28,10 @@ struct Estimate {
   std::int32_t sampling_zoom = 0;
 };
 
-// Meshes up to `sample_tiles` tiles of each zoom, evenly spaced, without their neighbours' borders.
+// Meshes two to six tiles of each zoom, evenly spaced, without their neighbours' borders, on the
+// run's threads.
 Estimate estimate_build(const BuildOptions& options, const BuildPlan& plan,
-                        const Heightfield& heightfield, const MemoryPlan& memory,
-                        std::int32_t sample_tiles);
+                        const Heightfield& heightfield, const MemoryPlan& memory);
 
 std::string estimate_text(const Estimate& estimate);
 std::string estimate_json(const Estimate& estimate);  // one line
