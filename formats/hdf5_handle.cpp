@@ -4,6 +4,8 @@
 
 #include <type_traits>
 
+#include "formats/errors.h"
+
 namespace qmpipe {
 
 static_assert(std::is_same_v<Hdf5Handle::Close, herr_t (*)(hid_t)>);
@@ -20,9 +22,12 @@ std::string hdf5_cause() {
   return cause.empty() ? "the HDF5 library gives no reason" : cause;
 }
 
-bool is_hdf5_thread_safe() {
+void require_thread_safe_hdf5(const std::filesystem::path& path) {
   hbool_t is_safe = false;
-  return H5is_library_threadsafe(&is_safe) >= 0 && is_safe;
+  if (H5is_library_threadsafe(&is_safe) >= 0 && is_safe) return;
+  throw IoError("cannot use the HDF5 library for", path.string(),
+                "it was built without thread safety",
+                "Install an HDF5 library that was configured with --enable-threadsafe.");
 }
 
 }  // namespace qmpipe

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <utility>
 
@@ -15,9 +16,9 @@ void silence_hdf5();
 // What failed first in the last call of HDF5 on this thread, in the library's words.
 std::string hdf5_cause();
 
-// False when calls from different threads need a lock around them all, which nobody can hold: GDAL
-// calls HDF5 too.
-bool is_hdf5_thread_safe();
+// Throws IoError, naming `path`, when calls of the library from different threads need a lock around
+// them all, which nobody can hold: GDAL calls HDF5 too.
+void require_thread_safe_hdf5(const std::filesystem::path& path);
 
 // Closes what it holds.
 class Hdf5Handle {

@@ -9,14 +9,14 @@
 #include <unordered_map>
 #include <vector>
 
-#include "formats/block_cache.h"
 #include "formats/block_codec.h"
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/hdf5_handle.h"
 #include "formats/lattice_segment.h"
-#include "formats/lattice_segment_files.h"
 #include "formats/lattice_window.h"
+#include "formats/recent_cache.h"
+#include "formats/segment_files.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
@@ -28,6 +28,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kFullSegmentBlocks = 1024;
 // A node of a hash map and its bucket.
 constexpr std::int64_t kIndexEntryBytes = 112;
+constexpr auto kBlockBytes = static_cast<std::int64_t>(kBlockSize * sizeof(float));
 
 class Hdf5LatticeStore final : public LatticeStore {
  public:
@@ -36,7 +37,7 @@ class Hdf5LatticeStore final : public LatticeStore {
         scheme_(scheme),
         options_(options),
         codec_(options.compression_level),
-        cache_(options.cache_bytes) {}
+        cache_(options.cache_bytes, kBlockBytes) {}
   ~Hdf5LatticeStore() override;
   Hdf5LatticeStore(const Hdf5LatticeStore&) = delete;
   Hdf5LatticeStore& operator=(const Hdf5LatticeStore&) = delete;
@@ -87,7 +88,7 @@ class Hdf5LatticeStore final : public LatticeStore {
   const TilingScheme scheme_;
   const Hdf5LatticeOptions options_;
   const BlockCodec codec_;
-  mutable BlockCache cache_;
+  mutable RecentCache<std::vector<float>> cache_;
 
   // One segment at a time; taken before mutex_.
   std::mutex write_mutex_;
@@ -128,8 +129,8 @@ Hdf5LatticeStore::~Hdf5LatticeStore() {
 }
 
 std::optional<Error> Hdf5LatticeStore::load_segment(std::int32_t number) {
-  const auto entries =
-      read_lattice_segment(segment_path(folder_, number), scheme_, options_.max_zoom);
+  const auto entries = read_lattice_segment(segment_path(folder_, SegmentKind::kLattice, number),
+                                            scheme_, options_.max_zoom);
   if (!entries) return entries.error();
   for (const SegmentEntry& entry : *entries) {
     if (entry.chunk.bytes == 0) {
@@ -212,7 +213,7 @@ void Hdf5LatticeStore::write_segment(When when) {
   if (batch.empty()) return;
   std::vector<std::shared_ptr<const PackedBlock>> blocks;
   for (const Pending& pending : batch) blocks.push_back(pending.block);
-  const fs::path path = segment_path(folder_, next_segment_);
+  const fs::path path = segment_path(folder_, SegmentKind::kLattice, next_segment_);
   const EncodedSegment segment = encode_lattice_segment(path, scheme_, blocks);
   write_file_durably(path, segment.bytes);
   settle(batch, segment.entries);
@@ -251,15 +252,13 @@ BlockHeights Hdf5LatticeStore::unpack(const TileKey& key, std::span<const std::u
 }
 
 BlockHeights Hdf5LatticeStore::load_block(const TileKey& key, const Stored& stored) const {
-  const fs::path path = segment_path(folder_, stored.segment);
+  const fs::path path = segment_path(folder_, SegmentKind::kLattice, stored.segment);
   const auto chunk = read_file_range(path, stored.chunk.offset, stored.chunk.bytes);
   const bool is_damaged = chunk && content_hash(key, *chunk) != stored.content_hash;
   if (!chunk || is_damaged) {
-    throw IoError(
-        fmt::format("cannot read block {} of", to_string(key)), path.string(),
-        is_damaged ? "its bytes are not those that were written" : chunk.error().message,
-        "The file was changed, moved or damaged since it was written; check the disk, then "
-        "build with --overwrite to start over.");
+    throw IoError(fmt::format("cannot read block {} of", to_string(key)), path.string(),
+                  is_damaged ? "its bytes are not those that were written" : chunk.error().message,
+                  kSegmentChanged);
   }
   return unpack(key, *chunk, path);
 }
@@ -299,29 +298,19 @@ Result<std::unique_ptr<LatticeStore>> open_hdf5_lattice_store(const fs::path& fo
                                                               const TilingScheme& scheme,
                                                               const Hdf5LatticeOptions& options) {
   QMPIPE_CHECK(options.max_zoom >= 0 && options.max_zoom <= kMaxZoom);
-  if (!is_hdf5_thread_safe()) {
-    throw IoError("cannot use the HDF5 library for", folder.string(),
-                  "it was built without thread safety",
-                  "Install an HDF5 library that was configured with --enable-threadsafe.");
-  }
-  prepare_segment_folder(folder);
+  require_thread_safe_hdf5(folder);
+  prepare_segment_folder(folder, SegmentKind::kLattice);
+  const auto count = count_without_gaps(folder, SegmentKind::kLattice);
+  if (!count) return count.error();
   auto store = std::make_unique<Hdf5LatticeStore>(folder, scheme, options);
-  std::int32_t expected = 0;
-  for (const std::int32_t number : segment_numbers(folder)) {
-    if (number != expected) {
-      return Error{
-          fmt::format("{}: the file is missing, though later ones are there; remove the "
-                      "run folder, or build with --overwrite, to start over",
-                      segment_path(folder, expected).string())};
-    }
+  for (std::int32_t number = 0; number < *count; ++number) {
     if (const auto error = store->load_segment(number)) return *error;
-    ++expected;
   }
   return std::unique_ptr<LatticeStore>(std::move(store));
 }
 
 std::int32_t count_lattice_segments(const fs::path& folder) {
-  return static_cast<std::int32_t>(segment_numbers(folder).size());
+  return static_cast<std::int32_t>(segment_numbers(folder, SegmentKind::kLattice).size());
 }
 
 }  // namespace qmpipe

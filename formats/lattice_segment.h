@@ -43,7 +43,6 @@ struct EncodedSegment {
   std::vector<SegmentEntry> entries;
 };
 
-const char* segment_scheme_name(const TilingScheme& scheme);
 std::uint64_t content_hash(const TileKey& key, std::span<const std::uint8_t> chunk);
 
 // Builds the file in memory, so that only our own code meets a full disk. `path` appears in

@@ -1,13 +1,10 @@
 // The lattice store on disk: crashes, damage, full disks, and other readers.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/mount.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <fstream>
 #include <string>
 #include <thread>
@@ -16,9 +13,11 @@
 #include "formats/file_bytes.h"
 #include "formats/file_seal.h"
 #include "formats/hdf5_lattice_store.h"
-#include "formats/lattice_segment_files.h"
 #include "formats/little_endian.h"
+#include "formats/segment_files.h"
 #include "tests/lattice_blocks.h"
+#include "tests/program_output.h"
+#include "tests/small_disk.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {
@@ -28,8 +27,14 @@ namespace fs = std::filesystem;
 using testing::block_of_seed;
 using testing::BlockModel;
 using ::testing::HasSubstr;
+using testing::output_of;
+using testing::SmallDisk;
 using testing::TemporaryFolder;
 using testing::window_of_block;
+
+fs::path segment_path(const fs::path& folder, std::int32_t number) {
+  return qmpipe::segment_path(folder, SegmentKind::kLattice, number);
+}
 
 const TilingScheme kGeodetic{Projection::kGeodetic};
 const TilingScheme kMercator{Projection::kMercator};
@@ -243,23 +248,6 @@ TEST(Hdf5LatticeStore, SaysSoWhenTheFolderGoesAwayUnderIt) {
   EXPECT_THROW(store->seal(), IoError);
 }
 
-class SmallDisk {
- public:
-  explicit SmallDisk(fs::path folder) : folder_(std::move(folder)) {
-    is_mounted_ = ::mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=2m") == 0;
-  }
-  ~SmallDisk() {
-    if (is_mounted_) ::umount(folder_.c_str());
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-  bool is_mounted() const { return is_mounted_; }
-
- private:
-  fs::path folder_;
-  bool is_mounted_ = false;
-};
-
 TEST(Hdf5LatticeStore, LosesNothingOnAFullDisk) {
   const TemporaryFolder folder;
   const SmallDisk disk(folder.path());
@@ -302,16 +290,6 @@ TEST(Hdf5LatticeStore, KeepsMemoryWithinItsBounds) {
   ASSERT_EQ(model.differences(*store, kGeodetic), 0U);
   EXPECT_GE(store->memory_bytes(), kCache);
   EXPECT_LE(store->memory_bytes(), kCache + 60 * 200);
-}
-
-std::string output_of(const std::string& command) {
-  std::string text;
-  std::FILE* pipe = ::popen((command + " 2>&1").c_str(), "r");
-  if (pipe == nullptr) return text;
-  std::array<char, 4096> buffer;
-  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) text += buffer.data();
-  ::pclose(pipe);
-  return text;
 }
 
 TEST(Hdf5LatticeStore, IsAnOrdinaryHdf5FileToOtherPrograms) {

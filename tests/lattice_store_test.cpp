@@ -6,9 +6,9 @@
 #include <string>
 #include <thread>
 
-#include "formats/block_cache.h"
 #include "formats/block_codec.h"
 #include "formats/hdf5_lattice_store.h"
+#include "formats/recent_cache.h"
 #include "formats/tiered_lattice_store.h"
 #include "tests/lattice_blocks.h"
 #include "tests/temporary_folder.h"
@@ -182,22 +182,22 @@ TEST_P(AnyLatticeStore, EightThreadsPutAndReadTheirOwnBlocks) {
   for (std::int32_t n = 0; n < kThreads * kBlocksEach; ++n) ASSERT_TRUE(is_right(n)) << n;
 }
 
-TEST(BlockCache, LetsGoOfWhatWasAskedForLongestAgo) {
-  BlockCache cache(3 * 256 * 256 * 4 + 5);
-  const auto block = std::make_shared<const std::vector<float>>(kVoidBlock);
-  for (const std::uint64_t version : {1U, 2U, 3U}) cache.add(version, block);
+TEST(RecentCache, LetsGoOfWhatWasAskedForLongestAgo) {
+  RecentCache<int> cache(3 * 100 + 5, 100);
+  const auto value = std::make_shared<const int>(7);
+  for (const std::uint64_t name : {1U, 2U, 3U}) cache.add(name, value);
   EXPECT_NE(cache.find(1), nullptr);
-  cache.add(4, block);
+  cache.add(4, value);
   EXPECT_EQ(cache.find(2), nullptr);
   EXPECT_NE(cache.find(1), nullptr);
   EXPECT_NE(cache.find(3), nullptr);
   EXPECT_NE(cache.find(4), nullptr);
-  EXPECT_EQ(cache.memory_bytes(), 3 * 256 * 256 * 4);
+  EXPECT_EQ(cache.memory_bytes(), 300);
 }
 
-TEST(BlockCache, KeepsNothingWithoutRoomForABlock) {
-  BlockCache cache(256 * 256 * 4 - 1);
-  cache.add(1, std::make_shared<const std::vector<float>>(kVoidBlock));
+TEST(RecentCache, KeepsNothingWithoutRoomForAValue) {
+  RecentCache<int> cache(99, 100);
+  cache.add(1, std::make_shared<const int>(7));
   EXPECT_EQ(cache.find(1), nullptr);
   EXPECT_EQ(cache.memory_bytes(), 0);
 }

@@ -1,4 +1,4 @@
-#include "formats/lattice_segment_files.h"
+#include "formats/segment_files.h"
 
 #include <fmt/format.h>
 
@@ -17,26 +17,36 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kPrefix = "lattice-";
 constexpr std::string_view kSuffix = ".h5";
 
-std::optional<std::int32_t> segment_number(const fs::path& path) {
+std::string_view prefix_of(SegmentKind kind) {
+  switch (kind) {
+    case SegmentKind::kLattice:
+      return "lattice-";
+    case SegmentKind::kBorders:
+      return "borders-";
+  }
+  return {};
+}
+
+std::optional<std::int32_t> segment_number(const fs::path& path, SegmentKind kind) {
+  const std::string_view prefix = prefix_of(kind);
   const std::string name = path.filename().string();
-  if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) return std::nullopt;
+  if (!name.starts_with(prefix) || !name.ends_with(kSuffix)) return std::nullopt;
   const char* end = name.data() + name.size() - kSuffix.size();
   std::int32_t number = 0;
-  const auto parsed = std::from_chars(name.data() + kPrefix.size(), end, number);
+  const auto parsed = std::from_chars(name.data() + prefix.size(), end, number);
   // One name for one number: nothing else would be found again.
   if (parsed.ec != std::errc() || parsed.ptr != end || number < 0 ||
-      segment_path(path.parent_path(), number) != path) {
+      segment_path(path.parent_path(), kind, number) != path) {
     return std::nullopt;
   }
   return number;
 }
 
-bool is_torn_segment(const fs::path& path) {
+bool is_torn_segment(const fs::path& path, SegmentKind kind) {
   const std::string name = path.filename().string();
-  return name.starts_with(kPrefix) && name.ends_with(kTemporarySuffix);
+  return name.starts_with(prefix_of(kind)) && name.ends_with(kTemporarySuffix);
 }
 
 [[noreturn]] void throw_io_error(const char* what_failed, const fs::path& path,
@@ -56,25 +66,37 @@ std::vector<fs::path> files_of(const fs::path& folder) {
 
 }  // namespace
 
-fs::path segment_path(const fs::path& folder, std::int32_t number) {
-  return folder / fmt::format("{}{:06}{}", kPrefix, number, kSuffix);
+fs::path segment_path(const fs::path& folder, SegmentKind kind, std::int32_t number) {
+  return folder / fmt::format("{}{:06}{}", prefix_of(kind), number, kSuffix);
 }
 
-std::vector<std::int32_t> segment_numbers(const fs::path& folder) {
+std::vector<std::int32_t> segment_numbers(const fs::path& folder, SegmentKind kind) {
   std::vector<std::int32_t> numbers;
   for (const fs::path& file : files_of(folder)) {
-    if (const auto number = segment_number(file)) numbers.push_back(*number);
+    if (const auto number = segment_number(file, kind)) numbers.push_back(*number);
   }
   std::sort(numbers.begin(), numbers.end());
   return numbers;
 }
 
-void prepare_segment_folder(const fs::path& folder) {
+Result<std::int32_t> count_without_gaps(const fs::path& folder, SegmentKind kind) {
+  std::int32_t expected = 0;
+  for (const std::int32_t number : segment_numbers(folder, kind)) {
+    if (number != expected) {
+      return Error{fmt::format("{}: the file is missing, though later ones are there; {}",
+                               segment_path(folder, kind, expected).string(), kStartOver)};
+    }
+    ++expected;
+  }
+  return expected;
+}
+
+void prepare_segment_folder(const fs::path& folder, SegmentKind kind) {
   std::error_code code;
   fs::create_directories(folder, code);
   if (code) throw_io_error("cannot create the folder", folder, code);
   for (const fs::path& file : files_of(folder)) {
-    if (is_torn_segment(file)) fs::remove(file, code);
+    if (is_torn_segment(file, kind)) fs::remove(file, code);
     if (code) throw_io_error("cannot remove", file, code);
   }
 }
