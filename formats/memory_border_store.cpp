@@ -1,3 +1,4 @@
+#include <array>
 #include <mutex>
 #include <unordered_map>
 
@@ -6,6 +7,9 @@
 
 namespace qmpipe {
 namespace {
+
+// A node of a hash map and its bucket.
+constexpr std::int64_t kBorderBytesInMemory = 88;
 
 class MemoryBorderStore final : public BorderStore {
  public:
@@ -25,12 +29,16 @@ class MemoryBorderStore final : public BorderStore {
     return mask;
   }
 
+  void seal() override {}
+
   std::int64_t size() const override {
     const std::scoped_lock lock(mutex_);
     std::int64_t n = 0;
     for (const auto& borders : borders_) n += static_cast<std::int64_t>(borders.size());
     return n;
   }
+
+  std::int64_t memory_bytes() const override { return size() * kBorderBytesInMemory; }
 
  private:
   mutable std::mutex mutex_;
