@@ -2,8 +2,10 @@
 
 #include <benchmark/benchmark.h>
 
+#include <atomic>
 #include <chrono>
 #include <ctime>
+#include <future>
 
 #include "formats/hdf5_lattice_store.h"
 #include "perf/cold_files.h"
@@ -30,9 +32,9 @@ std::unique_ptr<const LatticeInputs> make_inputs(DemKind kind) {
   return inputs;
 }
 
-double thread_cpu_s() {
+double process_cpu_s() {
   timespec now{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec) * 1e-9;
 }
 
@@ -62,36 +64,49 @@ void put_all(LatticeStore& store, const LatticeInputs& inputs) {
   store.seal();
 }
 
-void visit_windows(const LatticeInputs& inputs, const FillWindow& fill) {
+void visit_windows(const LatticeInputs& inputs, std::span<const FillWindow> fills) {
   const Lattice lattice(kScheme, kDemZoom);
-  std::vector<float> heights_m;
-  for (const TileKey& tile : inputs.dem->tiles()) {
-    const PostWindow window = Lattice::tile_window(tile, 1);
-    heights_m.resize(window.size());
-    fill(lattice, window, heights_m);
-    benchmark::DoNotOptimize(heights_m.data());
+  const std::vector<TileKey>& tiles = inputs.dem->tiles();
+  std::atomic<std::size_t> next = 0;
+  const auto visit = [&](const FillWindow& fill) {
+    std::vector<float> heights_m;
+    for (std::size_t k = next++; k < tiles.size(); k = next++) {
+      const PostWindow window = Lattice::tile_window(tiles[k], 1);
+      heights_m.resize(window.size());
+      fill(lattice, window, heights_m);
+      benchmark::DoNotOptimize(heights_m.data());
+    }
+  };
+  std::vector<std::future<void>> others;
+  for (const FillWindow& fill : fills.subspan(1)) {
+    others.push_back(std::async(std::launch::async, visit, fill));
   }
+  visit(fills.front());
+  for (std::future<void>& other : others) other.get();
 }
 
-void read_all(const LatticeStore& store, const LatticeInputs& inputs) {
-  visit_windows(inputs, [&store](const Lattice& lattice, const PostWindow& window,
-                                 std::span<float> out) { store.read(lattice, window, out); });
+void read_all(const LatticeStore& store, const LatticeInputs& inputs, std::size_t threads) {
+  const std::vector<FillWindow> fills(
+      threads, [&store](const Lattice& lattice, const PostWindow& window, std::span<float> out) {
+        store.read(lattice, window, out);
+      });
+  visit_windows(inputs, fills);
 }
 
 PassTime read_cold(const std::filesystem::path& folder, const LatticeInputs& inputs,
-                   std::int64_t cache_bytes) {
+                   std::int64_t cache_bytes, std::size_t threads) {
   const auto store = open_disk_store(folder, cache_bytes);
   forget_cached_pages(folder);
-  return time_of([&] { read_all(*store, inputs); });
+  return time_of([&] { read_all(*store, inputs, threads); });
 }
 
 PassTime time_of(const std::function<void()>& work) {
   const auto started = std::chrono::steady_clock::now();
-  const double cpu_started_s = thread_cpu_s();
+  const double cpu_started_s = process_cpu_s();
   work();
   return {
       .wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count(),
-      .cpu_s = thread_cpu_s() - cpu_started_s};
+      .cpu_s = process_cpu_s() - cpu_started_s};
 }
 
 void measure_passes(benchmark::State& state, const LatticeInputs& inputs,

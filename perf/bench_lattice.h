@@ -2,7 +2,7 @@
 // the mesh pass reads them (windows of 259 x 259 posts, tiles in the wavefront's order).
 //
 // A pass's time is the wall's, since writing waits for the disk; its CPU time comes as a counter,
-// for machines that have other work too. One thread does it all.
+// for machines that have other work too.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "formats/lattice_store.h"
@@ -48,8 +49,9 @@ std::unique_ptr<LatticeStore> open_disk_store(const std::filesystem::path& folde
 void put_all(LatticeStore& store, const LatticeInputs& inputs);
 
 using FillWindow = std::function<void(const Lattice&, const PostWindow&, std::span<float>)>;
-void visit_windows(const LatticeInputs& inputs, const FillWindow& fill);
-void read_all(const LatticeStore& store, const LatticeInputs& inputs);
+// Asks for every tile's window once, on as many threads as there are functions: each has its own.
+void visit_windows(const LatticeInputs& inputs, std::span<const FillWindow> fills);
+void read_all(const LatticeStore& store, const LatticeInputs& inputs, std::size_t threads);
 
 struct PassTime {
   double wall_s = 0;
@@ -63,8 +65,9 @@ struct PassTime {
 
 // From a store that is opened anew, with empty caches, the kernel's included.
 PassTime read_cold(const std::filesystem::path& folder, const LatticeInputs& inputs,
-                   std::int64_t cache_bytes);
+                   std::int64_t cache_bytes, std::size_t threads);
 
+// CPU time is that of all threads.
 PassTime time_of(const std::function<void()>& work);
 
 // Runs `pass` once an iteration; it returns the time that counts, which becomes the benchmark's.

@@ -48,7 +48,7 @@ def first_line_of(command):
         done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
-    return done.stdout.splitlines()[0] if done.stdout else "unknown"
+    return done.stdout.splitlines()[0] if done.stdout else ""
 
 
 def cpu_model():
@@ -68,8 +68,7 @@ def machine(build):
     build_type = cache.get("CMAKE_BUILD_TYPE", "unknown")
     flags = cache.get("CMAKE_CXX_FLAGS_" + build_type.upper(), "")
     commit = first_line_of(["git", "rev-parse", "--short=12", "HEAD"])
-    if subprocess.run(["git", "diff", "--quiet", "HEAD"], cwd=ROOT, capture_output=True,
-                      check=False).returncode != 0:
+    if first_line_of(["git", "status", "--porcelain"]) not in ("", "unknown"):
         commit += " with changes"
     return {"cpu": cpu_model(), "cores": os.cpu_count(),
             "memory_bytes": os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"),

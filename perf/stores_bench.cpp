@@ -30,7 +30,7 @@ void memory_put(benchmark::State& state, const LatticeInputs& inputs) {
 void memory_read(benchmark::State& state, const LatticeInputs& inputs) {
   const auto store = make_memory_lattice_store(kScheme, kDemZoom);
   put_all(*store, inputs);
-  measure_passes(state, inputs, [&] { return time_of([&] { read_all(*store, inputs); }); });
+  measure_passes(state, inputs, [&] { return time_of([&] { read_all(*store, inputs, 1); }); });
 }
 
 void disk_put(benchmark::State& state, const LatticeInputs& inputs) {
@@ -49,14 +49,15 @@ void disk_read_warm(benchmark::State& state, const LatticeInputs& inputs) {
   const testing::TemporaryFolder folder;
   const auto store = open_disk_store(folder.path(), 2 * kWideCacheBytes);
   put_all(*store, inputs);
-  read_all(*store, inputs);
-  measure_passes(state, inputs, [&] { return time_of([&] { read_all(*store, inputs); }); });
+  read_all(*store, inputs, 1);
+  measure_passes(state, inputs, [&] { return time_of([&] { read_all(*store, inputs, 1); }); });
 }
 
 void disk_read_cold(benchmark::State& state, const LatticeInputs& inputs) {
   const testing::TemporaryFolder folder;
   put_all(*open_disk_store(folder.path(), 0), inputs);
-  measure_passes(state, inputs, [&] { return read_cold(folder.path(), inputs, kWideCacheBytes); });
+  measure_passes(state, inputs,
+                 [&] { return read_cold(folder.path(), inputs, kWideCacheBytes, 1); });
 }
 
 void publish_and_take(benchmark::State& state) {
