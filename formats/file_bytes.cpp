@@ -62,7 +62,8 @@ int write_and_close(const std::string& path, std::span<const std::uint8_t> bytes
 }
 
 // 0 or errno. A renamed file has its new name after a power cut only when its folder was synced.
-int sync_folder(const std::filesystem::path& folder) {
+int sync_folder(const std::filesystem::path& path) {
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
   FileHandle handle(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!handle.is_open() || ::fsync(handle.descriptor()) != 0) return errno;
   return handle.close();
@@ -75,7 +76,7 @@ void write_and_rename(const std::filesystem::path& path, std::span<const std::ui
   if (error == 0 && ::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
   if (error != 0) ::unlink(temporary.c_str());
   if (error == 0 && sync == Sync::kYes) {
-    error = sync_folder(path.has_parent_path() ? path.parent_path() : ".");
+    error = sync_folder(path);
   }
   if (error == 0) return;
   throw IoError("cannot write", path.string(), text_of_errno(error), remedy_for_errno(error));
@@ -156,6 +157,13 @@ void write_file_atomically(const std::filesystem::path& path, std::span<const st
 
 void write_file_durably(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
   write_and_rename(path, bytes, Sync::kYes);
+}
+
+void sync_folder_of(const std::filesystem::path& path) {
+  const int error = sync_folder(path);
+  if (error == 0) return;
+  throw IoError("cannot sync the folder of", path.string(), text_of_errno(error),
+                remedy_for_errno(error));
 }
 
 Result<std::vector<std::uint8_t>> read_file_bytes(const std::filesystem::path& path,

@@ -22,6 +22,9 @@ void write_file_atomically(const std::filesystem::path& path, std::span<const st
 // The same, and on return the file and its name are on the disk: it outlives a power cut.
 void write_file_durably(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 
+// The names of what was made in the path's folder are on the disk after it. Throws IoError.
+void sync_folder_of(const std::filesystem::path& path);
+
 // Refuses what is no regular file, cannot be read or is larger than limit_bytes.
 Result<std::vector<std::uint8_t>> read_file_bytes(const std::filesystem::path& path,
                                                   std::size_t limit_bytes);

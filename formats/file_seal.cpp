@@ -61,6 +61,14 @@ void append_seal(std::vector<std::uint8_t>& file, std::vector<ByteRange> payload
   file.insert(file.end(), kMagic.begin(), kMagic.end());
 }
 
+std::span<const std::uint8_t> without_seal(std::span<const std::uint8_t> file) {
+  QMPIPE_CHECK(file.size() >= kTailBytes);
+  const std::uint8_t* tail = file.data() + file.size() - kTailBytes;
+  const auto body_bytes = load_little_endian<std::uint64_t>(tail + kWord);
+  QMPIPE_CHECK(body_bytes <= file.size());
+  return file.first(body_bytes);
+}
+
 std::optional<Error> check_seal(const std::filesystem::path& path) {
   const auto refused = [&path](const std::string& cause) {
     return Error{fmt::format("{}: {}", path.string(), cause)};

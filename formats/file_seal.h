@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "formats/result.h"
@@ -30,5 +31,8 @@ void append_seal(std::vector<std::uint8_t>& file, std::vector<ByteRange> payload
 // What is wrong with the file at `path`, naming it; nothing when it is as it was sealed. Reads the
 // seal and what lies outside the payload.
 std::optional<Error> check_seal(const std::filesystem::path& path);
+
+// What stands before the seal. REQUIRES: the whole of a file that check_seal() passed.
+std::span<const std::uint8_t> without_seal(std::span<const std::uint8_t> file);
 
 }  // namespace qmpipe

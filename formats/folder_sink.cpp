@@ -1,9 +1,11 @@
 #include "formats/folder_sink.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <unordered_set>
@@ -92,24 +94,50 @@ void sync_file_system_of(const fs::path& folder) {
   }
 }
 
+// What tells a folder from another one of the same name.
+struct FolderIdentity {
+  dev_t device = 0;
+  ino_t number = 0;
+  friend bool operator==(const FolderIdentity&, const FolderIdentity&) = default;
+};
+
+std::optional<FolderIdentity> identity_of(const fs::path& folder) {
+  struct stat status {};
+  if (::stat(folder.c_str(), &status) != 0) return std::nullopt;
+  return FolderIdentity{.device = status.st_dev, .number = status.st_ino};
+}
+
 class FolderSink final : public TileSink {
  public:
-  explicit FolderSink(fs::path folder) : folder_(std::move(folder)) {}
+  explicit FolderSink(fs::path folder)
+      : folder_(std::move(folder)), identity_(identity_of(folder_)) {}
 
   void write(const TileKey& key, std::span<const std::uint8_t> bytes) override {
     QMPIPE_CHECK(!is_closed_);
     const fs::path path = folder_ / tile_file_name(key);
     const TileKey column = {.zoom = key.zoom, .x = key.x, .y = 0};
     if (!made_columns_.contains(column)) {
+      // Else a folder that was removed would come back with the tiles of some columns only.
+      require_same_folder();
       make_folders(path.parent_path());
       made_columns_.insert(column);
     }
     write_file_atomically(path, bytes);
   }
 
+  void sync() override {
+    require_same_folder();
+    sync_file_system_of(folder_);
+  }
+
+  bool has(const TileKey& key) const override {
+    struct stat status {};
+    return ::stat((folder_ / tile_file_name(key)).c_str(), &status) == 0 && S_ISREG(status.st_mode);
+  }
+
   void close(const LayerJson& layer) override {
     QMPIPE_CHECK(!is_closed_);
-    sync_file_system_of(folder_);
+    sync();
     const std::string text = write_layer_json(layer);
     const std::vector<std::uint8_t> bytes(text.begin(), text.end());
     write_file_atomically(folder_ / "layer.json", bytes);
@@ -117,7 +145,15 @@ class FolderSink final : public TileSink {
   }
 
  private:
-  fs::path folder_;
+  void require_same_folder() const {
+    if (identity_ && identity_of(folder_) == identity_) return;
+    throw IoError("cannot go on with", folder_.string(),
+                  "the folder was removed or replaced while the run was at work",
+                  "Run the same command again; what is missing is built again.");
+  }
+
+  const fs::path folder_;
+  const std::optional<FolderIdentity> identity_;
   // Keys with y = 0 stand for their x folder.
   std::unordered_set<TileKey, TileKeyHash> made_columns_;
   bool is_closed_ = false;
@@ -133,6 +169,11 @@ std::unique_ptr<TileSink> open_folder_sink(const fs::path& folder, Overwrite ove
     throw IoError("cannot start a tile set in", folder.string(), "the folder is not empty",
                   "Choose another folder, or pass --overwrite to replace the tile set in it.");
   }
+  return resume_folder_sink(folder);
+}
+
+std::unique_ptr<TileSink> resume_folder_sink(const fs::path& folder) {
+  make_folders(folder);
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
     throw_io_error("cannot write to the folder", folder,
                    std::error_code(errno, std::generic_category()));

@@ -1,6 +1,8 @@
 // A tile set as a folder: {z}/{x}/{y}.terrain and layer.json, ready for any static server.
 // Every file is written under a temporary name and renamed, so a file that has its name is whole.
 // close() syncs the tiles to disk before it writes layer.json.
+// A folder that is removed or replaced while the sink is open is noticed: by the next tile in a new
+// column, by sync() and by close(), which throw IoError.
 #pragma once
 
 #include <filesystem>
@@ -19,5 +21,10 @@ enum class Overwrite { kNo, kYes };
 // and the folders this empties. Nothing else is touched.
 std::unique_ptr<TileSink> open_folder_sink(const std::filesystem::path& folder,
                                            Overwrite overwrite);
+
+// Goes on with a tile set that an earlier run left unfinished: what the folder holds stays, and a
+// tile that is written again replaces the older one. The folder is made when it is gone. Throws
+// IoError when it cannot be written to.
+std::unique_ptr<TileSink> resume_folder_sink(const std::filesystem::path& folder);
 
 }  // namespace qmpipe

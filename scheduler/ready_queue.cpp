@@ -5,14 +5,28 @@
 #include "scheduler/check.h"
 
 namespace qmpipe {
+namespace {
 
-ReadyQueue::ReadyQueue(const WavefrontPlan& plan, std::int32_t max_in_flight)
-    : plan_(plan), max_in_flight_(max_in_flight) {
+// How many of its sides wait for a tile from `first` on.
+std::int32_t waits_for(const PlannedTile& tile, TileIndex first) {
+  std::int32_t count = 0;
+  for (const Side side : kSides) {
+    if (tile.roles[index_of(side)] != SideRole::kHeir) continue;
+    if (tile.neighbours[index_of(side)] >= first) ++count;
+  }
+  return count;
+}
+
+}  // namespace
+
+ReadyQueue::ReadyQueue(const WavefrontPlan& plan, std::int32_t max_in_flight, TileIndex first)
+    : plan_(plan), max_in_flight_(max_in_flight), next_to_retire_(first) {
   QMPIPE_CHECK(max_in_flight >= 1);
+  QMPIPE_CHECK(first >= 0 && static_cast<std::size_t>(first) <= plan.tiles.size());
   in_degree_.reserve(plan.tiles.size());
-  for (std::size_t k = 0; k < plan.tiles.size(); ++k) {
-    in_degree_.push_back(plan.tiles[k].in_degree);
-    if (plan.tiles[k].in_degree == 0) ready_.push(static_cast<TileIndex>(k));
+  for (const PlannedTile& tile : plan.tiles) in_degree_.push_back(waits_for(tile, first));
+  for (auto k = static_cast<std::size_t>(first); k < plan.tiles.size(); ++k) {
+    if (in_degree_[k] == 0) ready_.push(static_cast<TileIndex>(k));
   }
 }
 

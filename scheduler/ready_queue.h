@@ -23,8 +23,9 @@ namespace qmpipe {
 
 class ReadyQueue {
  public:
-  // REQUIRES: `plan` outlives the queue; max_in_flight >= 1.
-  ReadyQueue(const WavefrontPlan& plan, std::int32_t max_in_flight);
+  // The tiles before `first` were done by an earlier run: they count as published and retired.
+  // REQUIRES: `plan` outlives the queue; max_in_flight >= 1; 0 <= first <= number of tiles.
+  ReadyQueue(const WavefrontPlan& plan, std::int32_t max_in_flight, TileIndex first = 0);
 
   // The earliest ready tile, which is then in flight; none when nothing is ready now.
   std::optional<TileIndex> pop();

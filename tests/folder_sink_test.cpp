@@ -52,6 +52,43 @@ TEST(FolderSink, AFolderThatHoldsAnythingIsRefused) {
               HasSubstr("the folder is not empty\n  Choose another folder, or pass --overwrite"));
 }
 
+TEST(FolderSink, AResumedSetKeepsWhatItHasAndTakesTilesAgain) {
+  const TemporaryFolder folder;
+  const std::filesystem::path out = folder.path() / "out";
+  const TileKey first = {.zoom = 1, .x = 0, .y = 0};
+  const TileKey second = {.zoom = 1, .x = 0, .y = 1};
+  {
+    const auto sink = open_folder_sink(out, Overwrite::kNo);
+    sink->write(first, Bytes{1});
+    sink->write(second, Bytes{2});
+    sink->sync();
+  }
+  folder.put("out/1/0/1.terrain.qmpipe-tmp", "torn");
+  const auto sink = resume_folder_sink(out);
+  EXPECT_TRUE(sink->has(first));
+  EXPECT_FALSE(sink->has({.zoom = 1, .x = 1, .y = 1}));
+  sink->write(second, Bytes{3});
+  sink->close({});
+  EXPECT_EQ(folder.get("out/1/0/0.terrain"), "\x01");
+  EXPECT_EQ(folder.get("out/1/0/1.terrain"), "\x03");
+  EXPECT_FALSE(folder.has("out/1/0/1.terrain.qmpipe-tmp"));
+}
+
+TEST(FolderSink, AFolderThatIsTakenAwayIsNoticed) {
+  const TemporaryFolder folder;
+  const std::filesystem::path out = folder.path() / "out";
+  const auto sink = open_folder_sink(out, Overwrite::kNo);
+  sink->write({.zoom = 1, .x = 0, .y = 0}, Bytes{1});
+  std::filesystem::rename(out, folder.path() / "moved");
+  // Another one of the same name is not the same.
+  std::filesystem::create_directories(out);
+  EXPECT_THAT(io_error_of([&] { sink->write({.zoom = 1, .x = 1, .y = 0}, Bytes{1}); }),
+              HasSubstr("removed or replaced"));
+  EXPECT_THAT(io_error_of([&] { sink->sync(); }), HasSubstr("removed or replaced"));
+  EXPECT_THAT(io_error_of([&] { sink->close({}); }), HasSubstr("removed or replaced"));
+  EXPECT_TRUE(std::filesystem::is_empty(out));
+}
+
 TEST(FolderSink, OverwriteRemovesATileSetAndNothingElse) {
   const TemporaryFolder folder;
   const std::vector<std::string> ours = {

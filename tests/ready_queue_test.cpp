@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -35,8 +36,14 @@ class Run {
  public:
   enum class State : std::uint8_t { kWaiting, kInFlight, kPublished, kRetired };
 
-  Run(const WavefrontPlan& plan, std::int32_t window)
-      : plan_(plan), window_(window), queue_(plan, window), states_(plan.tiles.size()) {}
+  Run(const WavefrontPlan& plan, std::int32_t window, std::size_t first = 0)
+      : plan_(plan),
+        window_(window),
+        queue_(plan, window, static_cast<TileIndex>(first)),
+        states_(plan.tiles.size()),
+        retired_(first) {
+    std::fill_n(states_.begin(), first, State::kRetired);
+  }
 
   // False when there is nothing to hand out; `fault` says what was handed out wrongly.
   bool pop() {
@@ -99,15 +106,16 @@ bool apply(Run& run, int event) {
 // Visits every state that any order of events can reach; each by replaying its events.
 class Explorer {
  public:
-  Explorer(const WavefrontPlan& plan, std::int32_t window) : plan_(plan), window_(window) {}
+  Explorer(const WavefrontPlan& plan, std::int32_t window, std::size_t first = 0)
+      : plan_(plan), window_(window), first_(first) {}
 
   std::string explore(std::vector<int>& events) {
     bool progressed = false;
-    Run here(plan_, window_);
+    Run here(plan_, window_, first_);
     for (const int event : events) apply(here, event);
     if (here.done()) return "";
     for (int event = -2; event < static_cast<int>(plan_.tiles.size()); ++event) {
-      Run run(plan_, window_);
+      Run run(plan_, window_, first_);
       for (const int past : events) apply(run, past);
       if (!apply(run, event)) continue;
       progressed = true;
@@ -124,6 +132,7 @@ class Explorer {
  private:
   const WavefrontPlan& plan_;
   std::int32_t window_;
+  std::size_t first_;
   std::set<std::vector<Run::State>> seen_;
 };
 
@@ -151,6 +160,21 @@ TEST(ReadyQueue, EveryOrderOfEventsCompletesInTheMercatorScheme) {
   const WavefrontPlan root = plan_of(kMercator, 0, 1);
   std::vector<int> events;
   EXPECT_EQ(Explorer(root, 1).explore(events), "");
+}
+
+TEST(ReadyQueue, EveryOrderOfEventsCompletesFromAnyTileOn) {
+  for (const std::uint64_t bits : {255U, 0x7EU, 0xB7U}) {
+    const WavefrontPlan plan = plan_of(kGeodetic, 1, bits);
+    for (std::size_t first = 1; first <= plan.tiles.size(); ++first) {
+      for (const std::int32_t window : {1, 3, 8}) {
+        std::vector<int> events;
+        ASSERT_EQ(Explorer(plan, window, first).explore(events), "") << bits << " from " << first;
+      }
+    }
+  }
+  const WavefrontPlan plan = plan_of(kGeodetic, 1, 255);
+  EXPECT_TRUE(ReadyQueue(plan, 1, 8).all_retired());
+  EXPECT_THROW(ReadyQueue(plan, 1, 9), InternalError);
 }
 
 void run_at_random(const WavefrontPlan& plan, std::int32_t window, std::mt19937_64& random) {

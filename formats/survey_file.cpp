@@ -1,0 +1,127 @@
+#include "formats/survey_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "formats/file_bytes.h"
+#include "formats/file_seal.h"
+#include "formats/little_endian.h"
+#include "scheduler/lattice.h"
+
+namespace qmpipe {
+namespace {
+
+constexpr std::array<std::uint8_t, 8> kMagic = {'Q', 'M', 'S', 'U', 'R', 'V', '0', '1'};
+constexpr std::size_t kHeadBytes = kMagic.size() + 6 * sizeof(std::int32_t);
+constexpr std::size_t kTileBytes = 5 * sizeof(std::int32_t);
+// All tiles of the deepest zoom that any machine could survey.
+constexpr std::size_t kMostBytes = std::size_t{1} << 36U;
+constexpr std::int32_t kMostPosts = kTilePosts * kTilePosts;
+
+template <class T>
+void append(std::vector<std::uint8_t>& bytes, T value) {
+  bytes.resize(bytes.size() + sizeof(T));
+  store_little_endian(bytes.data() + bytes.size() - sizeof(T), value);
+}
+
+// Reads one number after the other. REQUIRES: there are enough.
+class Numbers {
+ public:
+  explicit Numbers(std::span<const std::uint8_t> bytes) : at_(bytes.data()) {}
+  template <class T>
+  T next() {
+    const T value = load_little_endian<T>(at_);
+    at_ += sizeof(T);
+    return value;
+  }
+
+ private:
+  const std::uint8_t* at_;
+};
+
+// Empty when the tile may stand in a survey.
+std::string fault_of(const SurveyedTile& tile, const TilingScheme& scheme) {
+  if (!scheme.contains(tile.key)) return "lies outside the tiling scheme";
+  // Also true for what is no number.
+  if (!(std::abs(tile.lowest_m) <= 1e30F && std::abs(tile.highest_m) <= 1e30F) ||
+      tile.lowest_m > tile.highest_m) {
+    return "has an impossible range of heights";
+  }
+  if (tile.valid_posts < 1 || tile.valid_posts > kMostPosts) {
+    return "has an impossible number of valid posts";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::filesystem::path survey_file_path(const std::filesystem::path& folder, std::int32_t zoom) {
+  return folder / fmt::format("survey-{:02}.qms", zoom);
+}
+
+void write_survey_file(const std::filesystem::path& path, std::int32_t zoom,
+                       const SurveyedZoom& surveyed) {
+  std::vector<std::uint8_t> bytes(kMagic.begin(), kMagic.end());
+  bytes.reserve(kHeadBytes + surveyed.tiles.size() * kTileBytes);
+  append(bytes, zoom);
+  append(bytes, static_cast<std::int32_t>(surveyed.tiles.size()));
+  for (const std::optional<float>& height_m : surveyed.pole_heights_m) {
+    append(bytes, std::int32_t{height_m.has_value()});
+    append(bytes, height_m.value_or(0));
+  }
+  for (const SurveyedTile& tile : surveyed.tiles) {
+    append(bytes, tile.key.x);
+    append(bytes, tile.key.y);
+    append(bytes, tile.lowest_m);
+    append(bytes, tile.highest_m);
+    append(bytes, tile.valid_posts);
+  }
+  append_seal(bytes, {});
+  write_file_durably(path, bytes);
+}
+
+Result<SurveyedZoom> parse_surveyed_zoom(std::span<const std::uint8_t> bytes, std::int32_t zoom,
+                                         const TilingScheme& scheme) {
+  if (bytes.size() < kHeadBytes || !std::equal(kMagic.begin(), kMagic.end(), bytes.begin())) {
+    return Error{"it holds no survey of this version"};
+  }
+  Numbers numbers(bytes.subspan(kMagic.size()));
+  if (numbers.next<std::int32_t>() != zoom) return Error{"it holds another zoom's survey"};
+  const auto count = numbers.next<std::int32_t>();
+  if (count < 0 || bytes.size() - kHeadBytes != static_cast<std::size_t>(count) * kTileBytes) {
+    return Error{"its length does not fit its number of tiles"};
+  }
+  SurveyedZoom surveyed;
+  for (std::optional<float>& height_m : surveyed.pole_heights_m) {
+    const bool has_height = numbers.next<std::int32_t>() != 0;
+    const auto value_m = numbers.next<float>();
+    if (has_height) height_m = value_m;
+  }
+  surveyed.tiles.resize(static_cast<std::size_t>(count));
+  const SurveyedTile* last = nullptr;
+  for (SurveyedTile& tile : surveyed.tiles) {
+    tile.key = {.zoom = zoom, .x = numbers.next<std::int32_t>(), .y = numbers.next<std::int32_t>()};
+    tile.lowest_m = numbers.next<float>();
+    tile.highest_m = numbers.next<float>();
+    tile.valid_posts = numbers.next<std::int32_t>();
+    std::string fault = fault_of(tile, scheme);
+    if (fault.empty() && last != nullptr && !(last->key < tile.key)) fault = "is out of order";
+    if (!fault.empty()) return Error{fmt::format("tile {} {}", to_string(tile.key), fault)};
+    last = &tile;
+  }
+  return surveyed;
+}
+
+Result<SurveyedZoom> read_survey_file(const std::filesystem::path& path, std::int32_t zoom,
+                                      const TilingScheme& scheme) {
+  if (const auto fault = check_seal(path)) return *fault;
+  const auto bytes = read_file_bytes(path, kMostBytes);
+  if (!bytes) return bytes.error();
+  auto surveyed = parse_surveyed_zoom(without_seal(*bytes), zoom, scheme);
+  if (!surveyed) return Error{fmt::format("{}: {}", path.string(), surveyed.error().message)};
+  return surveyed;
+}
+
+}  // namespace qmpipe
