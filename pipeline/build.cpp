@@ -4,18 +4,20 @@
 #include <oneapi/tbb/global_control.h>
 
 #include <algorithm>
-#include <chrono>
-#include <optional>
+#include <filesystem>
 #include <set>
+#include <utility>
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/folder_sink.h"
 #include "pipeline/build_plan.h"
+#include "pipeline/fingerprint.h"
 #include "pipeline/memory_share.h"
-#include "pipeline/run_folder.h"
+#include "pipeline/mesh_pass.h"
+#include "pipeline/run_record.h"
+#include "pipeline/scratch_folder.h"
 #include "pipeline/survey.h"
-#include "pipeline/tile_graph.h"
 #include "pipeline/version.h"
 
 namespace qmpipe {
@@ -106,44 +108,99 @@ LayerJson layer_for(const BuildOptions& options, const Survey& survey, const Bui
   return layer;
 }
 
-BuildReport empty_report(const BuildOptions& options, const BuildPlan& plan,
-                         const MemoryPlan& memory) {
-  BuildReport report;
-  report.threads = options.run.threads;
-  report.max_in_flight = memory.max_in_flight;
-  report.expected_peak_bytes = memory.expected_peak_bytes;
-  for (std::int32_t zoom = plan.recipe.min_zoom; zoom <= plan.recipe.max_zoom; ++zoom) {
-    const auto at = static_cast<std::size_t>(zoom);
-    BuiltZoom& row = report.zooms.emplace_back();
-    row.zoom = zoom;
-    row.tolerance_m = plan.recipe.tolerance_m[at];
-    row.height_step_m = plan.recipe.height_step_m[at];
+// What a build keeps on disk besides the tiles: a record to go on from, or a folder that goes with
+// the process.
+struct RunPlace {
+  std::unique_ptr<RunRecord> record;
+  std::unique_ptr<ScratchFolder> scratch;
+};
+
+RunPlace open_place(const BuildOptions& options, Progress& progress) {
+  RunPlace place;
+  if (options.run.dry_run || options.run.checkpoint_s == 0) return place;
+  place.record =
+      RunRecord::open(options.output.path, fingerprint_of(options), options.output.overwrite);
+  if (place.record->resumes()) {
+    progress.note(fmt::format("going on with the run in {}", place.record->folder().string()));
   }
-  return report;
+  return place;
 }
 
-BuildReport mesh_pass(const BuildOptions& options, const BuildPlan& plan,
-                      const Heightfield& heightfield, const MemoryPlan& memory, TileSink& sink,
-                      Progress& progress) {
-  BuildReport report = empty_report(options, plan, memory);
-  const auto started = std::chrono::steady_clock::now();
-  const std::unique_ptr<BorderStore> borders = make_memory_border_store();
-  const TileGraphResult result =
-      run_tile_graph(plan, heightfield, *borders, sink,
-                     {.threads = options.run.threads,
-                      .max_in_flight = memory.max_in_flight,
-                      .gzip_level = options.encode.gzip_level},
-                     progress, [&report](const TileWork& work) { report.add(work); });
-  if (result.stopped) {
-    throw Interrupted(
-        fmt::format("stopped after {} of {} tiles; {} holds no finished tile set (build again with "
-                    "--overwrite)",
-                    result.tiles_done, plan.tile_count(), options.output.path.string()));
+// Opened before hours of work, so that a folder that cannot be used is known at once.
+std::unique_ptr<TileSink> open_sink(const BuildOptions& options, const RunPlace& place) {
+  if (options.run.dry_run) return nullptr;
+  if (place.record != nullptr && place.record->resumes()) {
+    return resume_folder_sink(options.output.path);
   }
-  QMPIPE_CHECK(borders->size() == 0);
-  report.largest_in_flight = result.largest_in_flight;
-  report.mesh_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
-  return report;
+  return open_folder_sink(options.output.path, options.output.overwrite);
+}
+
+// A zoom that an earlier run has on disk stays there, however much memory there is now.
+MemoryShare share_for(const BuildOptions& options, const SurveyOptions& survey,
+                      const std::vector<RasterInfo>& sources, const RunPlace& place) {
+  std::int32_t deepest_memory_zoom = kMaxZoom;
+  if (place.record != nullptr && place.record->coarsest_surveyed()) {
+    deepest_memory_zoom = *place.record->coarsest_surveyed() - 1;
+  }
+  return share_memory(options.run.memory_bytes, survey, sources, deepest_memory_zoom);
+}
+
+void place_store(SurveyOptions& survey, const MemoryShare& share, const BuildOptions& options,
+                 RunPlace& place, Progress& progress) {
+  survey.record = place.record.get();
+  if (share.store_bytes == 0) return;
+  survey.last_memory_zoom = share.last_memory_zoom;
+  if (place.record == nullptr) place.scratch = std::make_unique<ScratchFolder>(options.output.path);
+  survey.store_folder = place.record != nullptr ? place.record->folder() : place.scratch->path();
+  progress.note(fmt::format(
+      "the lattice of the zooms deeper than {} is kept in {}: at most {} of disk",
+      share.last_memory_zoom, survey.store_folder.string(), bytes_text(share.store_bytes)));
+}
+
+void note_estimate(const BuildOptions& options, const Estimate& estimate, Progress& progress) {
+  progress.note(fmt::format("{} tiles, about {} and {:.0f} s, memory at most {}", estimate.tiles,
+                            bytes_text(estimate.bytes), std::max(1.0, estimate.seconds),
+                            bytes_text(estimate.expected_peak_bytes)));
+  std::error_code code;
+  const std::filesystem::space_info disk = std::filesystem::space(options.output.path, code);
+  if (!code && std::cmp_less(disk.available, estimate.bytes)) {
+    progress.note(fmt::format(
+        "the disk of {} has {} free, too little: the run will stop when it is "
+        "full, and can go on when there is more",
+        options.output.path.string(), bytes_text(static_cast<std::int64_t>(disk.available))));
+  }
+}
+
+BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey,
+                           const std::vector<RasterInfo>& sources, RunPlace& place,
+                           Progress& progress) {
+  const MemoryShare share = share_for(options, to_survey, sources, place);
+  const MemoryPlan& memory = share.plan;
+  set_raster_cache_bytes(memory.raster_cache_bytes);
+  to_survey.threads = memory.sampling_threads;
+  const std::unique_ptr<TileSink> sink = open_sink(options, place);
+  place_store(to_survey, share, options, place, progress);
+  const Survey survey = run_survey(to_survey, progress);
+  require_data(survey);
+  const BuildPlan plan = plan_build(options, survey);
+  const Heightfield heightfield(*survey.store, survey.scheme, options.mesh.voids,
+                                survey.pole_heights);
+  BuildResult result;
+  result.estimate = estimate_build(options, plan, heightfield, memory);
+  result.estimate.store_bytes = share.store_bytes;
+  progress.event(estimate_json(result.estimate));
+  if (options.run.dry_run) return result;
+  note_estimate(options, result.estimate, progress);
+
+  result.report =
+      run_mesh_pass(options, plan, heightfield, memory, *sink, place.record.get(), progress);
+  result.report.survey_s = survey.seconds;
+  result.report.peak_resident_bytes = peak_resident_bytes();
+  const std::string text = write_report(result.report);
+  write_file_atomically(options.output.path / "report.json",
+                        {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  sink->close(layer_for(options, survey, plan, result.report));
+  return result;
 }
 
 }  // namespace
@@ -155,46 +212,22 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   SurveyOptions to_survey = survey_options(options);
   const std::vector<RasterInfo> sources = describe_inputs(to_survey);
   note_assumptions(sources, progress);
-  const MemoryShare share = share_memory(options.run.memory_bytes, to_survey, sources);
-  const MemoryPlan& memory = share.plan;
-  set_raster_cache_bytes(memory.raster_cache_bytes);
-  to_survey.threads = memory.sampling_threads;
-  // Opened before hours of work, so that a folder that cannot be used is known at once.
-  std::unique_ptr<TileSink> sink;
-  if (!options.run.dry_run) sink = open_folder_sink(options.output.path, options.output.overwrite);
-
-  // Outlives the survey's store, which lies in it.
-  std::optional<RunFolder> run_folder;
-  if (share.store_bytes > 0) {
-    run_folder.emplace(options.output.path);
-    to_survey.store_folder = run_folder->path();
-    to_survey.last_memory_zoom = share.last_memory_zoom;
-    progress.note(fmt::format("the lattice of the zooms below {} is kept in {}: at most {} of disk",
-                              share.last_memory_zoom, run_folder->path().string(),
-                              bytes_text(share.store_bytes)));
+  // Refuses what cannot work before anything is made on disk.
+  share_memory(options.run.memory_bytes, to_survey, sources);
+  RunPlace place = open_place(options, progress);
+  try {
+    BuildResult result = build_in_place(options, to_survey, sources, place, progress);
+    if (place.record != nullptr) place.record->finish(options.run.keep_run);
+    return result;
+  } catch (const Interrupted& interrupted) {
+    const char* next = "nothing was finished yet";
+    if (place.record == nullptr) {
+      next = "without checkpoints nothing is kept (build again with --overwrite)";
+    } else if (place.record->is_worth_keeping()) {
+      next = "the checkpoint is kept: run the same command again to go on";
+    }
+    throw Interrupted(fmt::format("{}; {}", interrupted.what(), next));
   }
-  const Survey survey = run_survey(to_survey, progress);
-  require_data(survey);
-  const BuildPlan plan = plan_build(options, survey);
-  const Heightfield heightfield(*survey.store, survey.scheme, options.mesh.voids,
-                                survey.pole_heights);
-  BuildResult result;
-  result.estimate = estimate_build(options, plan, heightfield, memory);
-  progress.event(estimate_json(result.estimate));
-  if (options.run.dry_run) return result;
-  progress.note(fmt::format("{} tiles, about {} and {:.0f} s, memory at most {}",
-                            result.estimate.tiles, bytes_text(result.estimate.bytes),
-                            std::max(1.0, result.estimate.seconds),
-                            bytes_text(result.estimate.expected_peak_bytes)));
-
-  result.report = mesh_pass(options, plan, heightfield, memory, *sink, progress);
-  result.report.survey_s = survey.seconds;
-  result.report.peak_resident_bytes = peak_resident_bytes();
-  const std::string text = write_report(result.report);
-  write_file_atomically(options.output.path / "report.json",
-                        {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
-  sink->close(layer_for(options, survey, plan, result.report));
-  return result;
 }
 
 }  // namespace qmpipe

@@ -1,7 +1,9 @@
 // A whole build: survey, plan, estimate, mesh pass, layer.json, report.json.
 //
-// Guarantees: the tiles and layer.json depend on the inputs and the recipe alone, not on threads or
-// memory. layer.json is written last: a folder without it is no finished tile set.
+// Guarantees: the tiles and layer.json depend on the inputs and the recipe alone, not on threads,
+// memory or interruptions. layer.json is written last: a folder without it is no finished tile set.
+// A run that was stopped, killed or failed is gone on with by the next one with the same inputs and
+// parameters (pipeline/run_record.h).
 // Throws UsageError (options), IoError (files), Interrupted (asked to stop), InternalError (a bug).
 #pragma once
 

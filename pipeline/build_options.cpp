@@ -50,6 +50,11 @@ std::vector<std::string> violated_rules(const BuildOptions& options) {
   require(options.run.threads >= 1 && options.run.threads <= kMostThreads,
           fmt::format("--threads must be 1..{}", kMostThreads));
   require(options.run.memory_bytes >= 0, "--memory must not be negative");
+  // Also refuses what is no number.
+  require(options.run.checkpoint_s >= 0 && options.run.checkpoint_s <= 86400,
+          "--checkpoint must be 0..86400 seconds");
+  require(options.run.checkpoint_s > 0 || !options.run.keep_run,
+          "--keep-run needs checkpoints: leave out --checkpoint 0");
   return rules;
 }
 

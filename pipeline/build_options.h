@@ -55,6 +55,11 @@ struct RunOptions {
   std::int32_t threads = 1;
   // For the whole process; 0: nine tenths of the machine's memory. DEFAULT: 0.
   std::int64_t memory_bytes = 0;
+  // Between two checkpoints of the mesh pass, at least; 0: none at all, and an interrupted run starts
+  // again. DEFAULT: 10.
+  double checkpoint_s = 10;
+  // Leaves the run folder with its stores when the output is whole. DEFAULT: no.
+  bool keep_run = false;
   bool dry_run = false;
 };
 

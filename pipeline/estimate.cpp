@@ -119,10 +119,12 @@ std::string estimate_text(const Estimate& estimate) {
                         bytes_text(zoom.bytes), zoom.seconds);
   }
   text += fmt::format(
-      "estimate: {} tiles, about {}, about {:.0f} s to mesh, at most {} of memory (sampled at zoom "
-      "{})\n",
+      "estimate: {} tiles, about {}, about {:.0f} s to mesh, at most {} of memory and {} of disk "
+      "for "
+      "the lattice (sampled at zoom {})\n",
       estimate.tiles, bytes_text(estimate.bytes), std::max(1.0, estimate.seconds),
-      bytes_text(estimate.expected_peak_bytes), estimate.sampling_zoom);
+      bytes_text(estimate.expected_peak_bytes), bytes_text(estimate.store_bytes),
+      estimate.sampling_zoom);
   return text;
 }
 
@@ -132,6 +134,7 @@ std::string estimate_json(const Estimate& estimate) {
                                    {"bytes", estimate.bytes},
                                    {"mesh_s", estimate.seconds},
                                    {"expected_peak_bytes", estimate.expected_peak_bytes},
+                                   {"store_bytes", estimate.store_bytes},
                                    {"sampling_zoom", estimate.sampling_zoom}};
   for (const ZoomEstimate& zoom : estimate.zooms) {
     object["zooms"].push_back({{"zoom", zoom.zoom},

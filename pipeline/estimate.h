@@ -25,6 +25,7 @@ struct Estimate {
   std::int64_t bytes = 0;
   double seconds = 0;  // of wall time, on the given number of threads that have a core
   std::int64_t expected_peak_bytes = 0;
+  std::int64_t store_bytes = 0;  // of disk at most, for the lattice while the run lasts
   std::int32_t sampling_zoom = 0;
 };
 

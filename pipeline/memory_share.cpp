@@ -54,7 +54,7 @@ std::int64_t lattice_memory(const std::vector<std::int64_t>& blocks, std::int32_
 }  // namespace
 
 MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
-                         const std::vector<RasterInfo>& sources) {
+                         const std::vector<RasterInfo>& sources, std::int32_t deepest_memory_zoom) {
   const std::int64_t limit = effective_limit(limit_bytes);
   const std::int32_t sampling_zoom = chosen_sampling_zoom(survey, sources);
   MemoryNeeds needs = needs_of(survey, sources);
@@ -66,7 +66,7 @@ MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
 
   std::optional<MemoryShare> tight;
   std::int64_t least = std::numeric_limits<std::int64_t>::max();
-  for (std::int32_t last = sampling_zoom; last >= -1; --last) {
+  for (std::int32_t last = std::min(sampling_zoom, deepest_memory_zoom); last >= -1; --last) {
     needs.lattice_bytes = lattice_memory(blocks, last);
     MemoryShare share{.plan = plan_memory(limit, needs), .last_memory_zoom = last};
     for (std::int32_t zoom = last + 1; zoom <= sampling_zoom; ++zoom) {

@@ -19,8 +19,10 @@ struct MemoryShare {
 
 // As many zooms as fit half the limit stay in memory, coarse ones first; where no division leaves
 // enough for the work, throws UsageError with the least limit that would do.
-// `limit_bytes` 0: nine tenths of the machine's memory.
+// `limit_bytes` 0: nine tenths of the machine's memory. Zooms deeper than `deepest_memory_zoom` go to
+// disk even when they would fit.
 MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
-                         const std::vector<RasterInfo>& sources);
+                         const std::vector<RasterInfo>& sources,
+                         std::int32_t deepest_memory_zoom = kMaxZoom);
 
 }  // namespace qmpipe

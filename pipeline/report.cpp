@@ -55,6 +55,7 @@ void BuildReport::add(const TileWork& work) {
 std::string write_report(const BuildReport& report) {
   nlohmann::ordered_json object = {{"tiles", report.tiles},
                                    {"stored_bytes", report.stored_bytes},
+                                   {"resumed_tiles", report.resumed_tiles},
                                    {"threads", report.threads},
                                    {"survey_s", report.survey_s},
                                    {"mesh_s", report.mesh_s},

@@ -29,6 +29,7 @@ struct BuildReport {
   std::vector<BuiltZoom> zooms;
   std::int64_t tiles = 0;
   std::int64_t stored_bytes = 0;
+  std::int64_t resumed_tiles = 0;  // of all, those that interrupted runs had done
   std::uint64_t content_hash = 0;  // the same for the same tiles in any order
   double survey_s = 0;
   double mesh_s = 0;

@@ -121,6 +121,11 @@ class Surveyor {
   Survey run();
 
  private:
+  bool is_on_disk(std::int32_t zoom) const { return zoom > options_.last_memory_zoom; }
+  bool is_done_already(const BlockKey& block) const;
+  bool take_from_record(std::vector<BlockKey>& blocks, std::int32_t zoom);
+  void survey_zoom(std::vector<BlockKey>& blocks, std::int32_t zoom);
+  void write_down(std::int32_t zoom);
   void sample(std::vector<BlockKey>& blocks);
   void reduce_to(std::vector<BlockKey>& blocks);
   void settle_poles(const std::vector<BlockKey>& blocks, std::int32_t zoom);
@@ -145,6 +150,10 @@ void Surveyor::sample(std::vector<BlockKey>& blocks) {
   for_each_index(arena_, blocks.size(), [&](std::size_t k) {
     progress_.check_stop();
     const BlockKey& block = blocks[k];
+    if (is_done_already(block)) {
+      progress_.advance(static_cast<std::int64_t>(kBlockSize));
+      return;
+    }
     const PostWindow window = {.i0 = block.x * kBlockPosts,
                                .j0 = block.y * kBlockPosts,
                                .width_posts = kBlockPosts,
@@ -164,6 +173,7 @@ void Surveyor::reduce_to(std::vector<BlockKey>& blocks) {
   for_each_index(arena_, blocks.size(), [&](std::size_t k) {
     progress_.check_stop();
     const BlockKey& block = blocks[k];
+    if (is_done_already(block)) return;
     std::vector<float> heights_m(kBlockSize);
     reduce_block(*survey_.store, survey_.scheme, block.zoom, block.x, block.y, options_.reduction,
                  heights_m);
@@ -259,6 +269,51 @@ void Surveyor::list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom
   std::erase_if(tiles, [](const SurveyedTile& tile) { return tile.valid_posts == 0; });
 }
 
+// By a run that was interrupted while it was at this zoom. Blocks with a pole row are made again:
+// that row may or may not have got its one height. (At the sampling zoom it has one from the start.)
+bool Surveyor::is_done_already(const BlockKey& block) const {
+  if (options_.record == nullptr || !is_on_disk(block.zoom)) return false;
+  const Lattice lattice(survey_.scheme, block.zoom);
+  const bool has_pole =
+      lattice.is_pole_row(0) && (block.y == 0 || block.y == (lattice.rows() - 1) / kBlockPosts);
+  return !has_pole && survey_.store->has_block(block.zoom, block.x, block.y);
+}
+
+// True when an earlier run has finished the zoom.
+bool Surveyor::take_from_record(std::vector<BlockKey>& blocks, std::int32_t zoom) {
+  if (options_.record == nullptr || !is_on_disk(zoom)) return false;
+  if (!options_.record->is_surveyed(zoom)) return false;
+  SurveyedZoom surveyed = options_.record->surveyed(zoom, survey_.scheme);
+  survey_.pole_heights[static_cast<std::size_t>(zoom)] = surveyed.pole_heights_m;
+  if (zoom <= survey_.max_zoom) {
+    survey_.tiles[static_cast<std::size_t>(zoom)] = std::move(surveyed.tiles);
+  }
+  keep_present(*survey_.store, blocks);
+  return true;
+}
+
+void Surveyor::write_down(std::int32_t zoom) {
+  if (options_.record == nullptr || !is_on_disk(zoom)) return;
+  survey_.store->seal();
+  const auto at = static_cast<std::size_t>(zoom);
+  SurveyedZoom surveyed{.tiles = {}, .pole_heights_m = survey_.pole_heights[at]};
+  if (zoom <= survey_.max_zoom) surveyed.tiles = survey_.tiles[at];
+  options_.record->add_surveyed(zoom, surveyed);
+}
+
+void Surveyor::survey_zoom(std::vector<BlockKey>& blocks, std::int32_t zoom) {
+  if (zoom < survey_.sampling_zoom) blocks = coarser_blocks(survey_.scheme, blocks);
+  if (take_from_record(blocks, zoom)) return;
+  if (zoom == survey_.sampling_zoom) {
+    sample(blocks);
+  } else {
+    reduce_to(blocks);
+  }
+  settle_poles(blocks, zoom);
+  if (zoom <= survey_.max_zoom) list_tiles(blocks, zoom);
+  write_down(zoom);
+}
+
 Survey Surveyor::run() {
   const auto started = std::chrono::steady_clock::now();
   survey_.sources = describe_inputs(options_);
@@ -271,14 +326,11 @@ Survey Surveyor::run() {
 
   std::vector<BlockKey> blocks =
       covered_blocks(survey_.scheme, survey_.sampling_zoom, survey_.sources);
-  sample(blocks);
-  for (std::int32_t zoom = survey_.sampling_zoom; zoom >= 0; --zoom) {
-    if (zoom < survey_.sampling_zoom) {
-      blocks = coarser_blocks(survey_.scheme, blocks);
-      reduce_to(blocks);
-    }
-    settle_poles(blocks, zoom);
-    if (zoom <= survey_.max_zoom) list_tiles(blocks, zoom);
+  try {
+    for (std::int32_t zoom = survey_.sampling_zoom; zoom >= 0; --zoom) survey_zoom(blocks, zoom);
+  } catch (const Interrupted&) {
+    survey_.store->seal();
+    throw;
   }
   survey_.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();

@@ -1,8 +1,11 @@
 // The first pass over the source: samples the posts of the sampling zoom, reduces them 2:1 down to
 // zoom 0, and learns which tiles have data and how high they are (DESIGN 3).
 //
+// With a record, a zoom on disk is written down there when it is done, and one that an earlier run
+// has done is not done again; of one that it was at, only the blocks that are missing.
 // Guarantees: the lattice store it fills depends on the sources, the scheme and the options alone,
-// not on threads. Throws IoError when a source cannot be read, Interrupted when asked to stop.
+// not on threads or interruptions. Throws IoError when a source cannot be read, Interrupted when
+// asked to stop (what is on disk by then is sealed).
 #pragma once
 
 #include <cstdint>
@@ -13,7 +16,9 @@
 
 #include "formats/lattice_store.h"
 #include "formats/raster_source.h"
+#include "formats/survey_file.h"
 #include "pipeline/progress.h"
+#include "pipeline/run_record.h"
 #include "stages/heightfield.h"
 #include "stages/reduce.h"
 #include "stages/sampling.h"
@@ -33,16 +38,10 @@ struct SurveyOptions {
   std::int32_t threads = 1;
   // Deeper zooms than this are kept on disk, compressed; -1 keeps all there. DEFAULT: all in memory.
   std::int32_t last_memory_zoom = kMaxZoom;
-  // Where the store on disk lives; needed when a zoom is kept there. It must be empty.
+  // Where the store on disk lives; needed when a zoom is kept there. Empty, or the record's folder.
   std::filesystem::path store_folder = {};
-};
-
-// A tile with at least one valid post, and the range of its valid posts (257 x 257, sides included).
-struct SurveyedTile {
-  TileKey key;
-  float lowest_m = 0;
-  float highest_m = 0;
-  std::int32_t valid_posts = 0;
+  // DEFAULT: none; nothing is written down, and what the folder holds must be nothing.
+  RunRecord* record = nullptr;
 };
 
 struct Survey {

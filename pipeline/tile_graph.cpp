@@ -45,10 +45,10 @@ class TileGraph {
   const std::function<void(const TileWork&)>& on_tile_;
   TileBuilder builder_;
   ReadyQueue queue_;
+  std::int64_t tiles_done_;
   tbb::enumerable_thread_specific<GzipCompressor> compressors_;
   // Tiles that wait for a stage or are in it.
   std::array<std::atomic<std::int64_t>, kStageCount> held_{};
-  std::int64_t tiles_done_ = 0;
 
   flow::graph graph_;
   flow::function_node<Message, Message> window_node_;
@@ -69,13 +69,17 @@ TileGraph::TileGraph(const BuildPlan& plan, const Heightfield& heightfield, Bord
       progress_(progress),
       on_tile_(on_tile),
       builder_(heightfield, plan.recipe),
-      queue_(plan.wavefront, options.max_in_flight),
+      queue_(plan.wavefront, options.max_in_flight, options.first_tile),
+      tiles_done_(options.first_tile),
       compressors_([level = options.gzip_level] { return GzipCompressor(level.value_or(1)); }),
       window_node_(graph_, flow::unlimited, [this](const Message& m) { return window(m); }),
       mesh_node_(graph_, flow::unlimited, [this](const Message& m) { return mesh(m); }),
       finish_node_(graph_, flow::unlimited, [this](const Message& m) { return finish(m); }),
       encode_node_(graph_, flow::unlimited, [this](const Message& m) { return encode_tile(m); }),
-      sequencer_(graph_, [](const Message& m) { return static_cast<std::size_t>(m->index); }),
+      sequencer_(graph_,
+                 [first = options.first_tile](const Message& m) {
+                   return static_cast<std::size_t>(m->index - first);
+                 }),
       sink_node_(graph_, flow::serial, [this](const Message& m) {
         store(m);
         return flow::continue_msg();
@@ -176,7 +180,8 @@ std::vector<BufferFill> TileGraph::fills() const {
 
 TileGraphResult TileGraph::run() {
   {
-    const Phase phase(progress_, "mesh", "tiles", plan_.tile_count(), [this] { return fills(); });
+    const Phase phase(progress_, "mesh", "tiles", plan_.tile_count() - options_.first_tile,
+                      [this] { return fills(); });
     dispatch();
     graph_.wait_for_all();
   }

@@ -27,10 +27,12 @@ struct TileGraphOptions {
   std::int32_t threads = 1;
   std::int32_t max_in_flight = 8;
   std::optional<int> gzip_level;
+  // The tiles before it are done; `borders` has what they decided.
+  TileIndex first_tile = 0;
 };
 
 struct TileGraphResult {
-  std::int64_t tiles_done = 0;
+  std::int64_t tiles_done = 0;  // those before the first one included
   std::int32_t largest_in_flight = 0;
   bool stopped = false;  // before all tiles were done, on request
 };

@@ -1,5 +1,6 @@
 #include "pipeline/verify_source.h"
 
+#include <fmt/format.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
@@ -7,6 +8,9 @@
 #include <utility>
 
 #include "formats/raster_source.h"
+#include "pipeline/estimate.h"
+#include "pipeline/memory_share.h"
+#include "pipeline/scratch_folder.h"
 #include "pipeline/survey.h"
 #include "stages/sampling.h"
 
@@ -15,8 +19,10 @@ namespace {
 
 class SurveyedPosts final : public SourcePosts {
  public:
-  SurveyedPosts(Recipe recipe, Survey survey)
-      : recipe_(std::move(recipe)),
+  // `scratch`, where the deepest zooms' lattice lies when memory is short, lives as long as this.
+  SurveyedPosts(Recipe recipe, Survey survey, std::unique_ptr<ScratchFolder> scratch)
+      : scratch_(std::move(scratch)),
+        recipe_(std::move(recipe)),
         survey_(std::move(survey)),
         heightfield_(*survey_.store, survey_.scheme, recipe_.voids, survey_.pole_heights) {}
 
@@ -40,6 +46,7 @@ class SurveyedPosts final : public SourcePosts {
   }
 
  private:
+  std::unique_ptr<ScratchFolder> scratch_;
   Recipe recipe_;
   Survey survey_;
   Heightfield heightfield_;
@@ -88,8 +95,9 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
                                                Progress& progress) {
   SurveyOptions survey = {.inputs = options.inputs, .source_crs = options.source_crs};
   survey.threads = options.threads;
+  // An input that cannot be opened is told before work starts.
+  const std::vector<RasterInfo> sources = describe_inputs(survey);
   if (!recipe) {
-    describe_inputs(survey);  // an input that cannot be opened is told before work starts
     return std::make_unique<SampledPosts>(options, scheme);
   }
   if (survey.source_crs.empty()) survey.source_crs = recipe->source_crs;
@@ -98,7 +106,17 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
   survey.scheme = scheme;
   survey.sampling_zoom = recipe->sampling_zoom;
   survey.max_zoom = recipe->max_zoom;
-  return std::make_unique<SurveyedPosts>(*recipe, run_survey(survey, progress));
+  const MemoryShare share = share_memory(0, survey, sources);
+  std::unique_ptr<ScratchFolder> scratch;
+  if (share.store_bytes > 0) {
+    scratch = std::make_unique<ScratchFolder>("");
+    survey.last_memory_zoom = share.last_memory_zoom;
+    survey.store_folder = scratch->path();
+    progress.note(fmt::format("the lattice is kept in {}: at most {} of disk",
+                              survey.store_folder.string(), bytes_text(share.store_bytes)));
+  }
+  Survey surveyed = run_survey(survey, progress);
+  return std::make_unique<SurveyedPosts>(*recipe, std::move(surveyed), std::move(scratch));
 }
 
 }  // namespace qmpipe

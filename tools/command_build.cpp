@@ -74,13 +74,15 @@ void print_effective(const BuildOptions& options) {
   }
   text += fmt::format(
       "  grid           {} cells\n  resampling     {}\n  reduce         {}\n  nodata         {}\n"
-      "  normals        {}\n  gzip           {}\n  threads        {}\n  memory         {}\n",
+      "  normals        {}\n  gzip           {}\n  threads        {}\n  memory         {}\n"
+      "  checkpoint     {} s\n",
       mesh.initial_grid_cells, name_of(options.input.resampling), name_of(mesh.reduction),
       name_of(mesh.voids), options.encode.normals ? "yes" : "no",
       options.encode.gzip_level ? std::to_string(*options.encode.gzip_level) : "none",
       options.run.threads,
       options.run.memory_bytes == 0 ? "nine tenths of the machine's"
-                                    : bytes_text(options.run.memory_bytes));
+                                    : bytes_text(options.run.memory_bytes),
+      options.run.checkpoint_s);
   std::fputs(text.c_str(), stderr);
 }
 
@@ -171,7 +173,8 @@ void add_mesh_options(CLI::App& command, BuildArguments& arguments) {
 void add_output_options(CLI::App& command, BuildArguments& arguments) {
   BuildOptions& options = arguments.options;
   command.add_option("-o,--output", options.output.path, "Folder for the tiles")->type_name("OUT");
-  command.add_flag("--overwrite", arguments.overwrite, "Replace an earlier tile set in OUT");
+  command.add_flag("--overwrite", arguments.overwrite,
+                   "Replace an earlier tile set in OUT; start an unfinished one over");
   command
       .add_option("--gzip", arguments.gzip,
                   "Gzip level 1 (fast) .. 12 (small), or none: plain tiles need no "
@@ -190,6 +193,14 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
                   "machine's")
       ->capture_default_str()
       ->type_name("SIZE");
+  command
+      .add_option("--checkpoint", options.run.checkpoint_s,
+                  "Seconds between two checkpoints: what a crash may cost; 0: none, an interrupted "
+                  "run starts again")
+      ->capture_default_str()
+      ->type_name("S");
+  command.add_flag("--keep-run", options.run.keep_run,
+                   "Leave OUT.qmpipe-run with its stores when the tiles are done");
   command.add_flag("--dry-run", options.run.dry_run,
                    "Stop after the estimate: tiles, size, time, memory");
   command.add_flag("--json", arguments.json,
@@ -212,7 +223,9 @@ void register_build(CLI::App& app, std::function<int()>& action) {
       "Example:\n"
       "  qmpipe build dem.tif -o tiles --attribution \"(c) Survey Office\"\n"
       "  qmpipe build fine.tif coarse.tif -o tiles --max-zoom 12 --tolerance-at 12=2 --memory 2G\n"
-      "Exit codes: 0 built, 1 failed, 2 wrong usage, 130 interrupted.");
+      "A run that was stopped, killed or failed goes on where it was: give the same command "
+      "again.\n"
+      "Exit codes: 0 built, 1 failed, 2 wrong usage, 130 interrupted (checkpoint kept).");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_build(*arguments); }; });
 }

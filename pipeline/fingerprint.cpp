@@ -1,0 +1,123 @@
+#include "pipeline/fingerprint.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "formats/raster_files.h"
+#include "pipeline/version.h"
+
+namespace qmpipe {
+namespace {
+
+using nlohmann::json;
+
+// The same file whatever folder the program is started in; names that are no paths stay as they are.
+std::string absolute_name(const std::string& path) {
+  std::error_code code;
+  if (!std::filesystem::exists(path, code)) return path;
+  const std::filesystem::path absolute = std::filesystem::canonical(path, code);
+  return code ? path : absolute.string();
+}
+
+json inputs_of(const InputOptions& input) {
+  json inputs = json::array();
+  for (const std::string& path : input.paths) {
+    json files = json::object();
+    for (const RasterFile& file : files_of_raster(path)) {
+      files[absolute_name(file.path)] = {{"bytes", file.bytes}, {"modified_ns", file.modified_ns}};
+    }
+    inputs.push_back({{"name", absolute_name(path)}, {"files", files}});
+  }
+  return inputs;
+}
+
+json parameters_of(const BuildOptions& options) {
+  const MeshOptions& mesh = options.mesh;
+  json tolerance_at = json::object();
+  for (const auto& [zoom, metres] : mesh.tolerance_at_m) {
+    tolerance_at[std::to_string(zoom)] = metres;
+  }
+  return {{"--source-crs", options.input.source_crs},
+          {"--resampling", name_of(options.input.resampling)},
+          {"--reduce", name_of(mesh.reduction)},
+          {"--nodata", name_of(mesh.voids)},
+          {"--scheme", mesh.projection == Projection::kGeodetic ? "geodetic" : "mercator"},
+          {"--min-zoom", mesh.min_zoom},
+          {"--max-zoom", mesh.max_zoom ? json(*mesh.max_zoom) : json("from the pixels")},
+          {"--method", name_of(mesh.method)},
+          {"--tolerance", mesh.root_tolerance_m},
+          {"--tolerance-at", tolerance_at},
+          {"--grid", mesh.initial_grid_cells},
+          {"--gzip", options.encode.gzip_level ? json(*options.encode.gzip_level) : json("none")},
+          {"normals", options.encode.normals}};
+}
+
+// The members that one of the objects has otherwise than the other, or not at all.
+template <class Say>
+void compare_members(const json& earlier, const json& now, const Say& say) {
+  const json none;
+  for (const auto& [name, value] : earlier.items()) {
+    const json& other = now.contains(name) ? now[name] : none;
+    if (other != value) say(name, value, other);
+  }
+  for (const auto& [name, value] : now.items()) {
+    if (!earlier.contains(name)) say(name, none, value);
+  }
+}
+
+void compare_inputs(const json& earlier, const json& now, std::vector<std::string>& differences) {
+  const auto names = [](const json& inputs) {
+    std::string text;
+    for (const json& input : inputs) text += (text.empty() ? "" : ", ") + input.at("name").dump();
+    return text;
+  };
+  if (names(earlier) != names(now)) {
+    differences.push_back(
+        fmt::format("the inputs were {}, and are {} now", names(earlier), names(now)));
+    return;
+  }
+  for (std::size_t k = 0; k < now.size(); ++k) {
+    compare_members(earlier.at(k).at("files"), now.at(k).at("files"),
+                    [&differences](const std::string& name, const json& was, const json& is) {
+                      const char* what = was.is_null()  ? "was not there before"
+                                         : is.is_null() ? "is gone"
+                                                        : "has changed (its size or time)";
+                      differences.push_back(fmt::format("the input's file {} {}", name, what));
+                    });
+  }
+}
+
+}  // namespace
+
+std::string fingerprint_of(const BuildOptions& options) {
+  const json fingerprint = {{"program_version", kProgramVersion},
+                            {"inputs", inputs_of(options.input)},
+                            {"parameters", parameters_of(options)}};
+  return fingerprint.dump();
+}
+
+std::vector<std::string> fingerprint_differences(const std::string& earlier,
+                                                 const std::string& now) try {
+  if (earlier == now) return {};
+  const json was = json::parse(earlier);
+  const json is = json::parse(now);
+  std::vector<std::string> differences;
+  if (was.at("program_version") != is.at("program_version")) {
+    differences.push_back(fmt::format("it was begun by version {} of the program, and this is {}",
+                                      was.at("program_version").dump(),
+                                      is.at("program_version").dump()));
+  }
+  compare_inputs(was.at("inputs"), is.at("inputs"), differences);
+  compare_members(was.at("parameters"), is.at("parameters"),
+                  [&differences](const std::string& name, const json& before, const json& after) {
+                    differences.push_back(
+                        fmt::format("{} was {}, and is {} now", name, before.dump(), after.dump()));
+                  });
+  return differences;
+} catch (const json::exception&) {
+  return {"the journal was written by another program"};
+}
+
+}  // namespace qmpipe

@@ -1,0 +1,209 @@
+#include "pipeline/run_record.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "formats/errors.h"
+#include "formats/file_bytes.h"
+#include "formats/hdf5_border_store.h"
+#include "formats/hdf5_lattice_store.h"
+#include "pipeline/fingerprint.h"
+
+namespace qmpipe {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr const char* kJournalName = "journal";
+constexpr const char* kStartOver = "Build with --overwrite to start over.";
+
+[[noreturn]] void throw_folder_error(const char* what_failed, const fs::path& folder,
+                                     const std::error_code& code) {
+  throw IoError(what_failed, folder.string(), code.message(), remedy_for_errno(code.value()));
+}
+
+void make_folder(const fs::path& folder) {
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code) throw_folder_error("cannot make the run's folder", folder, code);
+}
+
+void remove_folder(const fs::path& folder) {
+  std::error_code code;
+  fs::remove_all(folder, code);
+  if (code) throw_folder_error("cannot remove the run's folder", folder, code);
+}
+
+std::unique_ptr<Journal> open_journal(const fs::path& folder) {
+  make_folder(folder);
+  auto journal = Journal::open(folder / kJournalName);
+  if (!journal) {
+    throw IoError("cannot go on with the run in", folder.string(), journal.error().message,
+                  kStartOver);
+  }
+  return std::move(journal.value());
+}
+
+std::string listed(const std::vector<std::string>& sentences) {
+  std::string text;
+  for (const std::string& sentence : sentences) text += (text.empty() ? "" : "; ") + sentence;
+  return text;
+}
+
+}  // namespace
+
+fs::path run_folder_of(const fs::path& output) {
+  // "tiles/" and "tiles" are one folder.
+  const fs::path plain = output.has_filename() ? output : output.parent_path();
+  return plain.string() + ".qmpipe-run";
+}
+
+RunRecord::RunRecord(fs::path folder, std::unique_ptr<Journal> journal)
+    : folder_(std::move(folder)), journal_(std::move(journal)) {}
+
+RunRecord::~RunRecord() {
+  try {
+    if (is_kept_ || is_worth_keeping()) return;
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  } catch (const std::exception&) {
+    // The folder cannot even be listed: left as it is.
+  }
+}
+
+std::unique_ptr<RunRecord> RunRecord::open(const fs::path& output, const std::string& fingerprint,
+                                           Overwrite overwrite) {
+  const fs::path folder = run_folder_of(output);
+  const bool has_journal = fs::exists(folder / kJournalName);
+  if (has_journal && overwrite == Overwrite::kYes) {
+    // Not under the feet of a run that is at work; whether the journal is sound does not matter.
+    static_cast<void>(Journal::open(folder / kJournalName));
+  }
+  // Without a journal it is the rest of a run that was done and could not clear up.
+  if (!has_journal || overwrite == Overwrite::kYes) remove_folder(folder);
+  std::unique_ptr<RunRecord> record(new RunRecord(folder, open_journal(folder)));
+  // Whatever is wrong with an earlier run's folder, it is the user's to remove.
+  record->is_kept_ = !record->journal_->lines().empty();
+  record->read_lines(fingerprint);
+  record->check_stores();
+  record->is_kept_ = false;
+  return record;
+}
+
+void RunRecord::read_lines(const std::string& fingerprint) {
+  const std::vector<std::string>& lines = journal_->lines();
+  resumes_ = !lines.empty();
+  if (!resumes_) {
+    journal_->append(fingerprint);
+    return;
+  }
+  for (std::size_t k = 1; k < lines.size(); ++k) {
+    if (read_line(lines[k])) continue;
+    throw IoError("cannot go on with the run in", folder_.string(),
+                  fmt::format("line {} of its journal says nothing that this version knows", k + 1),
+                  kStartOver);
+  }
+  if (is_finished_) {
+    throw IoError("cannot go on with the run in", folder_.string(), "it is finished", kStartOver);
+  }
+  const auto differences = fingerprint_differences(lines.front(), fingerprint);
+  if (differences.empty()) return;
+  throw IoError("cannot go on with the unfinished run in", folder_.string(), listed(differences),
+                "Build with the same input and options as before to go on, or with --overwrite to "
+                "start over.");
+}
+
+bool RunRecord::read_line(const std::string& line) try {
+  const json object = json::parse(line);
+  if (object.contains("surveyed_zoom")) {
+    surveyed_[object.at("surveyed_zoom").get<std::int32_t>()] =
+        object.at("lattice_segments").get<std::int32_t>();
+  } else if (object.contains("plan")) {
+    plan_ = object.at("plan").dump();
+  } else if (object.contains("finished")) {
+    is_finished_ = true;
+  } else {
+    tiles_ = {.tiles_done = object.at("tiles_done").get<std::int64_t>(),
+              .border_segments = object.at("border_segments").get<std::int32_t>(),
+              .report_state = object.at("report").dump()};
+  }
+  return true;
+} catch (const json::exception&) {
+  return false;
+}
+
+// The stores notice a gap in their segments, but not that the last ones are gone.
+void RunRecord::check_stores() const {
+  const auto require = [this](const char* what, std::int32_t expected, std::int32_t found) {
+    if (found >= expected) return;
+    throw IoError("cannot go on with the run in", folder_.string(),
+                  fmt::format("its journal counts {} segments of the {} store, and {} are there",
+                              expected, what, found),
+                  kStartOver);
+  };
+  for (const auto& [zoom, segments] : surveyed_) {
+    require("lattice", segments, count_lattice_segments(folder_));
+  }
+  require("border", tiles_.border_segments, count_border_segments(folder_));
+}
+
+bool RunRecord::is_worth_keeping() const {
+  return !surveyed_.empty() || tiles_.tiles_done > 0 || count_lattice_segments(folder_) > 0;
+}
+
+std::optional<std::int32_t> RunRecord::coarsest_surveyed() const {
+  if (surveyed_.empty()) return std::nullopt;
+  return surveyed_.begin()->first;
+}
+
+SurveyedZoom RunRecord::surveyed(std::int32_t zoom, const TilingScheme& scheme) const {
+  auto surveyed = read_survey_file(survey_file_path(folder_, zoom), zoom, scheme);
+  if (surveyed) return std::move(surveyed.value());
+  throw IoError("cannot go on with the run in", folder_.string(), surveyed.error().message,
+                kStartOver);
+}
+
+void RunRecord::add_surveyed(std::int32_t zoom, const SurveyedZoom& surveyed) {
+  write_survey_file(survey_file_path(folder_, zoom), zoom, surveyed);
+  const std::int32_t segments = count_lattice_segments(folder_);
+  journal_->append(json{{"surveyed_zoom", zoom}, {"lattice_segments", segments}}.dump());
+  surveyed_[zoom] = segments;
+}
+
+void RunRecord::set_plan(const std::string& plan) {
+  const std::string text = json::parse(plan).dump();
+  if (plan_ && *plan_ != text) {
+    throw IoError("cannot go on with the run in", folder_.string(),
+                  "the survey finds other tiles or heights than before, so the input was changed",
+                  kStartOver);
+  }
+  if (!plan_) journal_->append(json{{"plan", json::parse(plan)}}.dump());
+  plan_ = text;
+}
+
+void RunRecord::add_tiles(const TileCheckpoint& checkpoint) {
+  journal_->append(json{{"tiles_done", checkpoint.tiles_done},
+                        {"border_segments", checkpoint.border_segments},
+                        {"report", json::parse(checkpoint.report_state)}}
+                       .dump());
+  tiles_ = checkpoint;
+}
+
+void RunRecord::finish(bool keep) {
+  is_kept_ = keep;
+  if (keep) {
+    journal_->append(json{{"finished", true}}.dump());
+    return;
+  }
+  // The journal first: a crash in between leaves a folder that claims nothing.
+  std::error_code code;
+  fs::remove(folder_ / kJournalName, code);
+  if (!code) fs::remove_all(folder_, code);
+  if (code) throw_folder_error("cannot remove the run's folder", folder_, code);
+}
+
+}  // namespace qmpipe

@@ -1,0 +1,86 @@
+// What a run has finished, kept beside the output so that another run can go on from there.
+//
+// The run folder OUT.qmpipe-run holds a journal (formats/journal.h) and the stores' segments. The
+// journal's lines are JSON objects: first the run's fingerprint, then one for each zoom whose survey
+// is on disk, one for the plan of the mesh pass, and one for each checkpoint, which counts the tiles
+// that are safe: the first n of the schedule, whose order never changes. A folder that is kept when
+// all is done ends with a line that says so.
+// Guarantees: nothing is counted before it is on disk. What a crash cut off is done again.
+// Used by one thread at a time.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "formats/folder_sink.h"
+#include "formats/journal.h"
+#include "formats/survey_file.h"
+
+namespace qmpipe {
+
+struct TileCheckpoint {
+  std::int64_t tiles_done = 0;
+  std::int32_t border_segments = 0;
+  std::string report_state;  // pipeline/report_state.h
+};
+
+class RunRecord {
+ public:
+  // Goes on with the run that `output`'s run folder tells of, or starts one; with kYes always starts
+  // one. Throws IoError, naming what differs, when the earlier run's fingerprint is another; when
+  // something that the journal counts on is damaged or missing; when another run is at work there.
+  static std::unique_ptr<RunRecord> open(const std::filesystem::path& output,
+                                         const std::string& fingerprint, Overwrite overwrite);
+  // Removes the folder when nothing in it is worth going on with.
+  ~RunRecord();
+  RunRecord(const RunRecord&) = delete;
+  RunRecord& operator=(const RunRecord&) = delete;
+
+  const std::filesystem::path& folder() const { return folder_; }
+  // An earlier run is gone on with.
+  bool resumes() const { return resumes_; }
+
+  bool is_surveyed(std::int32_t zoom) const { return surveyed_.contains(zoom); }
+  // The coarsest zoom whose survey is on disk.
+  std::optional<std::int32_t> coarsest_surveyed() const;
+  // REQUIRES: is_surveyed(zoom). Throws IoError when the file is not what was written.
+  SurveyedZoom surveyed(std::int32_t zoom, const TilingScheme& scheme) const;
+  // REQUIRES: the zoom's lattice is on disk.
+  void add_surveyed(std::int32_t zoom, const SurveyedZoom& surveyed);
+
+  // `plan` names the tiles and their order. Throws IoError when an earlier run had another.
+  void set_plan(const std::string& plan);
+  const TileCheckpoint& tiles() const { return tiles_; }
+  // REQUIRES: the tiles, and the borders that later ones need, are on disk.
+  void add_tiles(const TileCheckpoint& checkpoint);
+
+  // True when another run would go on from here instead of starting again.
+  bool is_worth_keeping() const;
+  // The output is whole: removes the folder, or keeps it for whoever wants to look into it.
+  void finish(bool keep);
+
+ private:
+  RunRecord(std::filesystem::path folder, std::unique_ptr<Journal> journal);
+  void read_lines(const std::string& fingerprint);
+  bool read_line(const std::string& line);
+  void check_stores() const;
+
+  const std::filesystem::path folder_;
+  std::unique_ptr<Journal> journal_;
+  bool resumes_ = false;
+  bool is_kept_ = false;
+  // The number of lattice segments when the zoom was finished.
+  std::map<std::int32_t, std::int32_t> surveyed_;
+  std::optional<std::string> plan_;
+  bool is_finished_ = false;
+  TileCheckpoint tiles_;
+};
+
+// OUT.qmpipe-run.
+std::filesystem::path run_folder_of(const std::filesystem::path& output);
+
+}  // namespace qmpipe

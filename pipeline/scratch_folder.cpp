@@ -1,0 +1,33 @@
+#include "pipeline/scratch_folder.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <system_error>
+
+#include "formats/errors.h"
+#include "formats/file_bytes.h"
+#include "pipeline/run_record.h"
+
+namespace qmpipe {
+
+namespace fs = std::filesystem;
+
+ScratchFolder::ScratchFolder(const fs::path& output) {
+  const fs::path base =
+      output.empty() ? fs::temp_directory_path() / "qmpipe-run" : run_folder_of(output);
+  path_ = fmt::format("{}-{}", base.string(), getpid());
+  std::error_code problem;
+  fs::create_directories(path_, problem);
+  if (problem) {
+    throw IoError("cannot make the run's folder", path_.string(), problem.message(),
+                  remedy_for_errno(problem.value()));
+  }
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+}  // namespace qmpipe
