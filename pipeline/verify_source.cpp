@@ -95,12 +95,10 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
                                                Progress& progress) {
   SurveyOptions survey = {.inputs = options.inputs, .source_crs = options.source_crs};
   survey.threads = options.threads;
+  if (recipe && survey.source_crs.empty()) survey.source_crs = recipe->source_crs;
   // An input that cannot be opened is told before work starts.
   const std::vector<RasterInfo> sources = describe_inputs(survey);
-  if (!recipe) {
-    return std::make_unique<SampledPosts>(options, scheme);
-  }
-  if (survey.source_crs.empty()) survey.source_crs = recipe->source_crs;
+  if (!recipe) return std::make_unique<SampledPosts>(options, scheme);
   survey.resampling = recipe->resampling;
   survey.reduction = recipe->reduction;
   survey.scheme = scheme;
