@@ -16,6 +16,7 @@
 #include "formats/raster_crs.h"
 #include "formats/raster_dataset.h"
 #include "formats/raster_extent.h"
+#include "formats/raster_reader.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
@@ -172,6 +173,7 @@ struct RasterSource::Impl {
   // middle.
   double turn = 360;
   double middle_x = 0;
+  std::optional<RasterReader> reader;
   // Kept between reads.
   std::vector<std::uint8_t> mask;
 
@@ -213,11 +215,6 @@ void RasterSource::Impl::describe(const std::string& path) {
     throw IoError("cannot read heights from", path, "its values are complex numbers",
                   "write the part that holds heights with gdal_calc.py or gdal_translate");
   }
-  int block_width = 0;
-  int block_height = 0;
-  band->GetBlockSize(&block_width, &block_height);
-  info.block_width = block_width;
-  info.block_height = block_height;
   if (dataset.GetRasterCount() > 1 && info.driver != "BAG" &&
       dataset.GetRasterBand(2)->GetColorInterpretation() != GCI_AlphaBand) {
     info.assumptions.push_back(
@@ -292,6 +289,8 @@ std::unique_ptr<RasterSource> RasterSource::open(const std::string& path,
   impl->describe(path);
   impl->place(crs_of(*impl->opened.dataset, path, impl->opened.name, options.crs_override));
   impl->measure();
+  describe_blocks(*impl->band, impl->rule.has_mask, impl->info);
+  impl->reader.emplace(*impl->band, impl->rule.has_mask, impl->info, options.cache, options.number);
   return std::unique_ptr<RasterSource>(new RasterSource(std::move(impl)));
 }
 
@@ -304,31 +303,15 @@ void RasterSource::read(const PixelWindow& window, std::span<double> out) const 
   QMPIPE_CHECK(window.width > 0 && window.height > 0 && out.size() == window.size());
   QMPIPE_CHECK(window.column0 >= 0 && window.column0 + window.width <= impl.info.width);
   QMPIPE_CHECK(window.row0 >= 0 && window.row0 + window.height <= impl.info.height);
-  const GdalSession session;
-  const auto read_band = [&](GDALRasterBand& band, void* into, GDALDataType type) {
-    const int width = static_cast<int>(window.width);
-    const int height = static_cast<int>(window.height);
-    const CPLErr result =
-        band.RasterIO(GF_Read, static_cast<int>(window.column0), static_cast<int>(window.row0),
-                      width, height, into, width, height, type, 0, 0, nullptr);
-    if (result == CE_None) return;
-    throw IoError(
-        "cannot read the raster", impl.info.path,
-        fmt::format("{} (columns {} to {}, rows {} to {})", session.cause("GDAL could not read it"),
-                    window.column0, window.column0 + window.width - 1, window.row0,
-                    window.row0 + window.height - 1),
-        "the file may be truncated or damaged; compare its size with the original");
-  };
-  read_band(*impl.band, out.data(), GDT_Float64);
+  impl.mask.resize(impl.rule.has_mask ? out.size() : 0);
+  impl.reader->read(window, out, impl.mask);
   for (double& value : out) value = impl.rule.height_m(value);
   if (!impl.rule.has_mask) return;
-  impl.mask.resize(out.size());
-  read_band(*impl.band->GetMaskBand(), impl.mask.data(), GDT_Byte);
   for (std::size_t k = 0; k < out.size(); ++k) {
     if (impl.mask[k] == 0) out[k] = kVoid;
   }
 }
 
-void set_raster_cache_bytes(std::int64_t bytes) { GDALSetCacheMax64(bytes); }
+void set_gdal_cache_bytes(std::int64_t bytes) { GDALSetCacheMax64(bytes); }
 
 }  // namespace qmpipe

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/source_block_cache.h"
 #include "scheduler/tiling_scheme.h"
 
 namespace qmpipe {
@@ -47,6 +48,12 @@ struct RasterInfo {
   std::int64_t height = 0;
   std::int64_t block_width = 0;
   std::int64_t block_height = 0;
+  // What a SourceBlockCache keeps as one block, in pixels: one or more of the file's.
+  std::int64_t cached_width = 0;
+  std::int64_t cached_height = 0;
+  std::int64_t cached_block_bytes = 0;
+  // What an open handle on the file may keep of the block it read last.
+  std::int64_t handle_bytes = 0;
   // Smallest extent of a pixel in degrees of longitude or latitude, measured at the centre of the
   // raster and at its corners; decides the sampling zoom.
   double pixel_deg = 0;
@@ -69,7 +76,12 @@ struct RasterInfo {
 struct OpenOptions {
   // Taken instead of the file's CRS; anything GDAL understands (EPSG:n, WKT, PROJ, a .prj file).
   // DEFAULT: empty, the file's own.
-  std::string crs_override;
+  std::string crs_override = {};
+  // Where decoded blocks are shared with other handles on the same file. DEFAULT: none, GDAL's own
+  // cache, which knows only one handle's.
+  std::shared_ptr<SourceBlockCache> cache = {};
+  // The same for all handles on one file in one cache, and different for every file.
+  std::uint32_t number = 0;
 };
 
 class RasterSource {
@@ -101,7 +113,7 @@ class RasterSource {
   std::unique_ptr<Impl> impl_;
 };
 
-// Bounds GDAL's block cache for the whole process.
-void set_raster_cache_bytes(std::int64_t bytes);
+// Bounds GDAL's own block cache for the whole process.
+void set_gdal_cache_bytes(std::int64_t bytes);
 
 }  // namespace qmpipe

@@ -21,7 +21,7 @@ std::unique_ptr<const LatticeInputs> make_inputs(DemKind kind) {
   const std::int32_t columns = is_small_run() ? 4 : 24;
   const std::int32_t rows = is_small_run() ? 2 : 6;
   // Files are written row by row: without room for a row of blocks, each is packed many times.
-  set_raster_cache_bytes(kWideCacheBytes);
+  set_gdal_cache_bytes(kWideCacheBytes);
   auto inputs = std::make_unique<LatticeInputs>();
   inputs->dem = std::make_unique<BenchDem>(kind, columns, rows);
   inputs->narrow_cache_bytes = columns * static_cast<std::int64_t>(kBlockSize * sizeof(float)) / 2;

@@ -41,7 +41,7 @@ std::vector<PostWindow> blocks_of(const RasterInfo& info, const Lattice& lattice
 }
 
 void sample_blocks(benchmark::State& state, const SampledRaster& raster, Resampling resampling) {
-  set_raster_cache_bytes(std::int64_t{256} << 20U);
+  set_gdal_cache_bytes(std::int64_t{256} << 20U);
   const RasterInfo info = RasterSource::open(raster.path)->info();
   const TilingScheme scheme(Projection::kGeodetic);
   const Lattice lattice(scheme, sampling_zoom_for(scheme, std::span(&info, 1)));

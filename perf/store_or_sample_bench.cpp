@@ -42,7 +42,7 @@ void store_and_read(benchmark::State& state, const LatticeInputs& inputs,
 }
 
 void sample_again(benchmark::State& state, const LatticeInputs& inputs, const Circumstances& now) {
-  set_raster_cache_bytes(cache_bytes_of(now, inputs));
+  set_gdal_cache_bytes(cache_bytes_of(now, inputs));
   measure_passes(state, inputs, [&] {
     // GDAL drops a dataset's blocks when it is closed, so new samplers have none.
     std::vector<FillWindow> fills;

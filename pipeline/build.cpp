@@ -176,7 +176,8 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
                            Progress& progress) {
   const MemoryShare share = share_for(options, to_survey, sources, place);
   const MemoryPlan& memory = share.plan;
-  set_raster_cache_bytes(memory.raster_cache_bytes);
+  set_gdal_cache_bytes(kGdalCacheBytes);
+  to_survey.source_cache_bytes = memory.source_cache_bytes;
   to_survey.threads = memory.sampling_threads;
   const std::unique_ptr<TileSink> sink = open_sink(options, place);
   place_store(to_survey, share, options, place, progress);
@@ -194,6 +195,7 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
 
   result.report =
       run_mesh_pass(options, plan, heightfield, memory, *sink, place.record.get(), progress);
+  result.report.source_reads = survey.source_reads;
   result.report.survey_s = survey.seconds;
   result.report.peak_resident_bytes = peak_resident_bytes();
   const std::string text = write_report(result.report);

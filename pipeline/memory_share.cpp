@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <limits>
-#include <optional>
 
 #include "formats/errors.h"
 #include "formats/hdf5_lattice_store.h"
+#include "pipeline/sampling_order.h"
 
 namespace qmpipe {
 namespace {
@@ -25,13 +25,19 @@ std::int64_t effective_limit(std::int64_t limit_bytes) {
   return static_cast<std::int64_t>(sysconf(_SC_PHYS_PAGES)) / 10 * 9 * sysconf(_SC_PAGESIZE);
 }
 
-MemoryNeeds needs_of(const SurveyOptions& survey, const std::vector<RasterInfo>& sources) {
+MemoryNeeds needs_of(const SurveyOptions& survey, const std::vector<RasterInfo>& sources,
+                     std::int64_t limit_bytes) {
   MemoryNeeds needs{.threads = survey.threads};
   for (const RasterInfo& source : sources) {
-    // GDAL keeps blocks in the band's type, eight bytes a pixel at most.
-    needs.source_block_bytes =
-        std::max(needs.source_block_bytes, source.block_width * source.block_height * 8);
+    needs.source_block_bytes = std::max(needs.source_block_bytes, source.cached_block_bytes);
+    // Every thread has a handle on every source.
+    needs.source_handle_bytes += source.handle_bytes;
   }
+  const Lattice lattice(survey.scheme, chosen_sampling_zoom(survey, sources));
+  // The rest is better used for tiles in flight, and for the system's own cache of the files.
+  needs.source_front_bytes =
+      std::min(front_bytes(lattice, sources, survey.threads, lattice.columns() / kBlockPosts),
+               limit_bytes / 4);
   return needs;
 }
 
@@ -51,20 +57,42 @@ std::int64_t lattice_memory(const std::vector<std::int64_t>& blocks, std::int32_
   return bytes + 3 * store.segment_bytes + store.cache_bytes + on_disk * kIndexBytesPerBlock;
 }
 
+struct Division {
+  MemoryShare share;
+  std::int64_t lattice_bytes = 0;
+};
+
+// The most of the lattice in memory that leaves the source its cache: a lattice on disk is packed
+// once, but strips that the cache cannot hold are unpacked for every block of posts.
+// REQUIRES: divisions, most of the lattice in memory first.
+MemoryShare choose(const std::vector<Division>& divisions, std::int64_t limit_bytes,
+                   std::int64_t front_bytes) {
+  // Half the front is a row of strips; what comes on top keeps threads from pushing each other out.
+  for (const std::int64_t cache_bytes : {front_bytes, front_bytes / 8 * 5, std::int64_t{0}}) {
+    for (const Division& division : divisions) {
+      if (division.lattice_bytes <= limit_bytes / 2 &&
+          division.share.plan.source_cache_bytes >= cache_bytes) {
+        return division.share;
+      }
+    }
+  }
+  return divisions.front().share;
+}
+
 }  // namespace
 
 MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
                          const std::vector<RasterInfo>& sources, std::int32_t deepest_memory_zoom) {
   const std::int64_t limit = effective_limit(limit_bytes);
   const std::int32_t sampling_zoom = chosen_sampling_zoom(survey, sources);
-  MemoryNeeds needs = needs_of(survey, sources);
+  MemoryNeeds needs = needs_of(survey, sources, limit);
   std::vector<std::int64_t> blocks;
   for (std::int32_t zoom = 0; zoom <= sampling_zoom; ++zoom) {
     blocks.push_back(expected_blocks(survey.scheme, zoom, sources));
     needs.tiles += blocks.back();
   }
 
-  std::optional<MemoryShare> tight;
+  std::vector<Division> divisions;
   std::int64_t least = std::numeric_limits<std::int64_t>::max();
   for (std::int32_t last = std::min(sampling_zoom, deepest_memory_zoom); last >= -1; --last) {
     needs.lattice_bytes = lattice_memory(blocks, last);
@@ -73,11 +101,9 @@ MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
       share.store_bytes += blocks[static_cast<std::size_t>(zoom)] * kBlockBytes;
     }
     least = std::min(least, share.plan.smallest_limit_bytes);
-    if (!share.plan.fits) continue;
-    if (needs.lattice_bytes <= limit / 2) return share;
-    if (!tight) tight = share;
+    if (share.plan.fits) divisions.push_back({share, needs.lattice_bytes});
   }
-  if (tight) return *tight;
+  if (!divisions.empty()) return choose(divisions, limit, needs.source_front_bytes);
   throw UsageError(fmt::format(
       "--memory: this work (sampling zoom {}) needs {} MiB or more, and the limit is {} MiB{}; "
       "give more, or less input, or a smaller --max-zoom where it is deeper than the pixels",

@@ -17,7 +17,8 @@ struct MemoryShare {
   std::int64_t store_bytes = 0;
 };
 
-// As many zooms as fit half the limit stay in memory, coarse ones first; where no division leaves
+// As many zooms as fit half the limit and leave the source its cache stay in memory, coarse ones
+// first; where no division leaves
 // enough for the work, throws UsageError with the least limit that would do.
 // `limit_bytes` 0: nine tenths of the machine's memory. Zooms deeper than `deepest_memory_zoom` go to
 // disk even when they would fit.

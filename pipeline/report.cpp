@@ -63,6 +63,10 @@ std::string write_report(const BuildReport& report) {
                                    {"largest_in_flight", report.largest_in_flight},
                                    {"expected_peak_bytes", report.expected_peak_bytes},
                                    {"peak_resident_bytes", report.peak_resident_bytes}};
+  object["source"] = {{"blocks", report.source_reads.blocks},
+                      {"decoded_blocks", report.source_reads.decoded_blocks},
+                      {"decoded_per_block", report.source_reads.decoded_per_block()},
+                      {"decoded_bytes", report.source_reads.decoded_bytes}};
   object["zooms"] = nlohmann::ordered_json::array();
   for (const BuiltZoom& zoom : report.zooms) object["zooms"].push_back(zoom_object(zoom));
   return object.dump(2) + "\n";
@@ -80,6 +84,11 @@ std::string report_table(const BuildReport& report) {
                         zoom.tolerance_m, zoom.error.largest_m, zoom.error.rms_m());
   }
   return text;
+}
+
+std::string source_reads_text(const SourceReads& reads) {
+  return fmt::format("{} blocks, each decoded {:.2f} times", reads.blocks,
+                     reads.decoded_per_block());
 }
 
 std::int64_t peak_resident_bytes() {

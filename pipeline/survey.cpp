@@ -4,15 +4,19 @@
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
+#include <oneapi/tbb/task_group.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <set>
 
 #include "formats/errors.h"
 #include "formats/hdf5_lattice_store.h"
+#include "formats/source_block_cache.h"
 #include "formats/tiered_lattice_store.h"
+#include "pipeline/sampling_order.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
@@ -23,10 +27,14 @@ constexpr std::size_t kBlockSize = static_cast<std::size_t>(kBlockPosts) * kBloc
 // Blocks are named like tiles; row 2^zoom holds the last row of posts.
 using BlockKey = TileKey;
 
-std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options) {
+std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options,
+                                      const std::shared_ptr<SourceBlockCache>& cache) {
   std::vector<std::unique_ptr<RasterSource>> sources;
   for (const std::string& input : options.inputs) {
-    sources.push_back(RasterSource::open(input, {.crs_override = options.source_crs}));
+    sources.push_back(
+        RasterSource::open(input, {.crs_override = options.source_crs,
+                                   .cache = cache,
+                                   .number = static_cast<std::uint32_t>(sources.size())}));
   }
   return std::make_unique<Sampler>(std::move(sources), options.resampling);
 }
@@ -35,6 +43,19 @@ std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options) {
 template <class Body>
 void for_each_index(tbb::task_arena& arena, std::size_t count, const Body& body) {
   arena.execute([&] { tbb::parallel_for(std::size_t{0}, count, body); });
+}
+
+// The same, but the threads take one k after the other, so that all work at one place.
+template <class Body>
+void for_each_in_order(tbb::task_arena& arena, std::int32_t threads, std::size_t count,
+                       const Body& body) {
+  std::atomic<std::size_t> next = 0;
+  const auto take = [&](std::int32_t) {
+    for (std::size_t k = next++; k < count && !tbb::is_current_task_group_canceling(); k = next++) {
+      body(k);
+    }
+  };
+  arena.execute([&] { tbb::parallel_for(0, threads, take, tbb::simple_partitioner()); });
 }
 
 // Columns first_x .. first_x + width - 1 (they wrap) and rows first_y .. first_y + height - 1.
@@ -142,14 +163,19 @@ class Surveyor {
 
 void Surveyor::sample(std::vector<BlockKey>& blocks) {
   const Lattice lattice(survey_.scheme, survey_.sampling_zoom);
+  const auto cache = std::make_shared<SourceBlockCache>(options_.source_cache_bytes);
+  // The rest of the survey goes by the order of the keys.
+  std::vector<BlockKey> order = blocks;
+  sort_for_sampling(
+      order, widest_strip(lattice, survey_.sources, options_.threads, options_.source_cache_bytes));
   // GDAL's datasets belong to one thread; each opens its own when it first has work.
   tbb::enumerable_thread_specific<std::unique_ptr<Sampler>> samplers(
-      [this] { return open_sampler(options_); });
+      [&] { return open_sampler(options_, cache); });
   const Phase phase(progress_, "survey", "posts",
                     static_cast<std::int64_t>(blocks.size() * kBlockSize));
-  for_each_index(arena_, blocks.size(), [&](std::size_t k) {
+  for_each_in_order(arena_, options_.threads, order.size(), [&](std::size_t k) {
     progress_.check_stop();
-    const BlockKey& block = blocks[k];
+    const BlockKey& block = order[k];
     if (is_done_already(block)) {
       progress_.advance(static_cast<std::int64_t>(kBlockSize));
       return;
@@ -166,6 +192,7 @@ void Surveyor::sample(std::vector<BlockKey>& blocks) {
     }
     progress_.advance(static_cast<std::int64_t>(kBlockSize));
   });
+  survey_.source_reads = cache->reads();
   keep_present(*survey_.store, blocks);
 }
 

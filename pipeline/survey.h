@@ -26,8 +26,8 @@
 namespace qmpipe {
 
 struct SurveyOptions {
-  std::vector<std::string> inputs;  // in order of priority
-  std::string source_crs;           // overrides the inputs' CRS when not empty
+  std::vector<std::string> inputs = {};  // in order of priority
+  std::string source_crs = {};           // overrides the inputs' CRS when not empty
   Resampling resampling = Resampling::kBilinear;
   Reduction reduction = Reduction::kMean;
   TilingScheme scheme{Projection::kGeodetic};
@@ -42,6 +42,8 @@ struct SurveyOptions {
   std::filesystem::path store_folder = {};
   // DEFAULT: none; nothing is written down, and what the folder holds must be nothing.
   RunRecord* record = nullptr;
+  // Bounds the decoded source blocks that the threads share while they sample.
+  std::int64_t source_cache_bytes = 256LL << 20U;
 };
 
 struct Survey {
@@ -53,6 +55,7 @@ struct Survey {
   std::vector<PoleHeights> pole_heights;  // by zoom
   // By zoom 0..max_zoom, each sorted by key; pole rows alone do not make a tile.
   std::vector<std::vector<SurveyedTile>> tiles;
+  SourceReads source_reads;
   double seconds = 0;
 };
 

@@ -8,7 +8,7 @@ namespace qmpipe {
 namespace {
 
 constexpr std::int64_t kPlanBytesPerTile = 160;
-constexpr std::int64_t kSmallestCacheBytes = 16LL << 20U;
+constexpr std::int64_t kSmallestCacheBytes = 8LL << 20U;
 constexpr std::int64_t kComfortableCacheBytes = 64LL << 20U;
 
 // Enough that every thread has work while the sink waits for the slowest tile of a chain.
@@ -20,32 +20,37 @@ constexpr std::int32_t comfortable_in_flight(std::int32_t threads) {
 
 MemoryPlan plan_memory(std::int64_t limit_bytes, const MemoryNeeds& needs) {
   QMPIPE_CHECK(needs.threads >= 1 && limit_bytes >= 0);
-  const std::int64_t fixed = kProgramBytes + needs.lattice_bytes + needs.tiles * kPlanBytesPerTile;
-  const std::int64_t smallest_cache = std::max(kSmallestCacheBytes, 4 * needs.source_block_bytes);
+  const std::int64_t fixed =
+      kProgramBytes + kGdalCacheBytes + needs.lattice_bytes + needs.tiles * kPlanBytesPerTile;
+  const std::int64_t smallest_cache = kSmallestCacheBytes + needs.source_block_bytes;
+  // The cache's bound does not hold for the block that a thread has in hand.
+  const std::int64_t bytes_per_sampler =
+      kSamplingBytesPerThread + needs.source_block_bytes + needs.source_handle_bytes;
 
   MemoryPlan plan;
   plan.smallest_limit_bytes =
-      fixed + smallest_cache + std::max(kSamplingBytesPerThread, kTileInFlightBytes);
+      fixed + smallest_cache + std::max(bytes_per_sampler, kTileInFlightBytes);
   plan.fits = limit_bytes == 0 || limit_bytes >= plan.smallest_limit_bytes;
-  plan.raster_cache_bytes = std::max(kComfortableCacheBytes, smallest_cache);
+  plan.source_cache_bytes =
+      std::max({kComfortableCacheBytes, smallest_cache, needs.source_front_bytes});
   plan.sampling_threads = needs.threads;
   plan.max_in_flight = comfortable_in_flight(needs.threads);
   // Sampling and meshing follow each other, so each may use what the other has given back.
-  const auto working_bytes = [&plan] {
-    return std::max(plan.sampling_threads * kSamplingBytesPerThread,
+  const auto working_bytes = [&plan, bytes_per_sampler] {
+    return std::max(plan.sampling_threads * bytes_per_sampler,
                     plan.max_in_flight * kTileInFlightBytes);
   };
   if (limit_bytes > 0) {
     // First the cache down to its least, then the tiles and samplers.
-    plan.raster_cache_bytes =
-        std::clamp(limit_bytes - fixed - working_bytes(), smallest_cache, plan.raster_cache_bytes);
-    const std::int64_t left = limit_bytes - fixed - plan.raster_cache_bytes;
+    plan.source_cache_bytes =
+        std::clamp(limit_bytes - fixed - working_bytes(), smallest_cache, plan.source_cache_bytes);
+    const std::int64_t left = limit_bytes - fixed - plan.source_cache_bytes;
     plan.max_in_flight = static_cast<std::int32_t>(
         std::clamp<std::int64_t>(left / kTileInFlightBytes, 1, plan.max_in_flight));
     plan.sampling_threads = static_cast<std::int32_t>(
-        std::clamp<std::int64_t>(left / kSamplingBytesPerThread, 1, plan.sampling_threads));
+        std::clamp<std::int64_t>(left / bytes_per_sampler, 1, plan.sampling_threads));
   }
-  plan.expected_peak_bytes = fixed + plan.raster_cache_bytes + working_bytes();
+  plan.expected_peak_bytes = fixed + plan.source_cache_bytes + working_bytes();
   return plan;
 }
 

@@ -148,6 +148,23 @@ TEST(MemoryShare, LessMemoryMovesTheDeepestZoomsToDiskFirst) {
   EXPECT_THROW(share_memory(50LL << 20U, survey, {source}), UsageError);
 }
 
+TEST(MemoryShare, TheLatticeGivesWayToTheStripsOfAWideSource) {
+  RasterInfo source;
+  source.width = 57600;
+  source.height = 2400;
+  source.bounds_deg = {.west_deg = 0, .south_deg = 10, .east_deg = 80, .north_deg = 13.3333};
+  source.pixel_deg = 80.0 / 57600;
+  source.cached_width = source.width;
+  source.cached_height = 1;
+  source.cached_block_bytes = source.width * 2;
+  SurveyOptions survey;
+  survey.threads = 2;
+  const MemoryShare share = share_memory(320LL << 20U, survey, {source});
+  EXPECT_LT(share.last_memory_zoom, chosen_sampling_zoom(survey, {source}));
+  EXPECT_GE(share.plan.source_cache_bytes, 260 * source.cached_block_bytes);
+  EXPECT_LE(share.plan.expected_peak_bytes, 320LL << 20U);
+}
+
 TEST_F(BuildTest, VerifyFindsNothingInAnyScheme) {
   std::uint32_t seed = 10;
   for (const Projection projection : {Projection::kGeodetic, Projection::kMercator}) {

@@ -108,6 +108,9 @@ class Cli(unittest.TestCase):
         self.assertEqual(report["tiles"], sum(zoom["tiles"] for zoom in report["zooms"]))
         on_disk = json.loads((self.root / "json" / "report.json").read_text())
         self.assertEqual(on_disk["tiles"], report["tiles"])
+        self.assertGreater(report["source"]["blocks"], 0)
+        self.assertLess(report["source"]["decoded_per_block"], 1.05)
+        self.assertEqual(on_disk["source"], report["source"])
 
     def test_dry_run_prints_the_estimate_and_writes_nothing(self):
         out = self.root / "dry"

@@ -17,6 +17,8 @@ MemoryNeeds random_needs(std::mt19937_64& random) {
   return {.threads = static_cast<std::int32_t>(1 + below(100)),
           .lattice_bytes = below(4 * kGiB),
           .source_block_bytes = below(2) == 0 ? below(100 * kMiB) : 0,
+          .source_front_bytes = below(kGiB),
+          .source_handle_bytes = below(kMiB),
           .tiles = below(1'000'000)};
 }
 
@@ -33,9 +35,9 @@ TEST(MemoryBudget, WhatFitsStaysBelowItsLimit) {
     ASSERT_GE(plan.max_in_flight, 1);
     ASSERT_GE(plan.sampling_threads, 1);
     ASSERT_LE(plan.sampling_threads, needs.threads);
-    ASSERT_GE(plan.raster_cache_bytes, needs.source_block_bytes);
+    ASSERT_GE(plan.source_cache_bytes, needs.source_block_bytes);
     // The peak is the sum of its parts, not a number of its own.
-    const std::int64_t parts = kProgramBytes + needs.lattice_bytes + plan.raster_cache_bytes +
+    const std::int64_t parts = kProgramBytes + needs.lattice_bytes + plan.source_cache_bytes +
                                plan.max_in_flight * kTileInFlightBytes;
     ASSERT_GE(plan.expected_peak_bytes, parts);
   }
@@ -69,9 +71,9 @@ TEST(MemoryBudget, MoreMemoryNeverGivesLess) {
       ASSERT_TRUE(plan.fits);
       ASSERT_GE(plan.max_in_flight, before.max_in_flight);
       ASSERT_GE(plan.sampling_threads, before.sampling_threads);
-      ASSERT_GE(plan.raster_cache_bytes, before.raster_cache_bytes);
+      ASSERT_GE(plan.source_cache_bytes, before.source_cache_bytes);
       ASSERT_LE(plan.max_in_flight, comfortable.max_in_flight);
-      ASSERT_LE(plan.raster_cache_bytes, comfortable.raster_cache_bytes);
+      ASSERT_LE(plan.source_cache_bytes, comfortable.source_cache_bytes);
       before = plan;
     }
   }
@@ -107,7 +109,27 @@ TEST(MemoryBudget, ALargeSourceBlockRaisesTheSmallestLimit) {
   const MemoryPlan small = plan_memory(0, {.threads = 2});
   const MemoryPlan large = plan_memory(0, {.threads = 2, .source_block_bytes = 200 * kMiB});
   EXPECT_GE(large.smallest_limit_bytes - small.smallest_limit_bytes, 200 * kMiB);
-  EXPECT_GE(large.raster_cache_bytes, 200 * kMiB);
+  EXPECT_GE(large.source_cache_bytes, 200 * kMiB);
+}
+
+TEST(MemoryBudget, TheCacheGrowsToWhatTheSurveyUses) {
+  const MemoryNeeds small_front = {.threads = 2, .source_front_bytes = kMiB};
+  const MemoryNeeds large_front = {.threads = 2, .source_front_bytes = 400 * kMiB};
+  EXPECT_EQ(plan_memory(0, large_front).source_cache_bytes, 400 * kMiB);
+  EXPECT_LT(plan_memory(0, small_front).source_cache_bytes, 100 * kMiB);
+  EXPECT_EQ(plan_memory(2 * kGiB, large_front).source_cache_bytes, 400 * kMiB);
+  const MemoryPlan tight = plan_memory(256 * kMiB, large_front);
+  EXPECT_TRUE(tight.fits);
+  EXPECT_LT(tight.source_cache_bytes, 256 * kMiB);
+  EXPECT_EQ(tight.max_in_flight, plan_memory(2 * kGiB, large_front).max_in_flight);
+}
+
+TEST(MemoryBudget, HandlesOfEveryThreadCount) {
+  const MemoryPlan none = plan_memory(0, {.threads = 8});
+  const MemoryPlan some = plan_memory(0, {.threads = 8, .source_handle_bytes = 50 * kMiB});
+  EXPECT_GE(some.smallest_limit_bytes - none.smallest_limit_bytes, 50 * kMiB);
+  EXPECT_GE(some.expected_peak_bytes,
+            kProgramBytes + some.source_cache_bytes + 8 * (kSamplingBytesPerThread + 50 * kMiB));
 }
 
 }  // namespace

@@ -50,6 +50,14 @@ void fill(GDALDataset& dataset, const RasterFixture& fixture) {
     require(band.RasterIO(GF_Write, 0, r, fixture.width, 1, row.data(), fixture.width, 1,
                           GDT_Float64, 0, 0, nullptr) == CE_None,
             "values");
+    for (int c = 0; c < fixture.width; ++c)
+      row[static_cast<std::size_t>(c)] = (c + r) % 7 == 0 ? 0 : 1;
+    for (int b = 0; b < fixture.more_bands; ++b) {
+      require(dataset.GetRasterBand(2 + b)->RasterIO(GF_Write, 0, r, fixture.width, 1, row.data(),
+                                                     fixture.width, 1, GDT_Float64, 0, 0,
+                                                     nullptr) == CE_None,
+              "values of more bands");
+    }
   }
   if (fixture.mask.empty()) return;
   std::vector<std::uint8_t> mask = fixture.mask;
@@ -82,13 +90,26 @@ void write_raster(const std::string& path, const RasterFixture& fixture) {
   for (const std::string& option : fixture.creation_options) options.AddString(option.c_str());
   GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
   GDALDataset* const dataset =
-      driver->Create(path.c_str(), fixture.width, fixture.height, 1,
+      driver->Create(path.c_str(), fixture.width, fixture.height, 1 + fixture.more_bands,
                      GDALGetDataTypeByName(fixture.type.c_str()), options.List());
   require(dataset != nullptr, "create");
   place(*dataset, fixture);
   describe(*dataset->GetRasterBand(1), fixture);
   fill(*dataset, fixture);
   GDALClose(GDALDataset::ToHandle(dataset));
+}
+
+void copy_raster(const std::string& from, const std::string& to, const std::string& driver) {
+  GDALAllRegister();
+  GDALDatasetH const source = GDALOpen(from.c_str(), GA_ReadOnly);
+  require(source != nullptr, "open");
+  GDALDriverH const into = GDALGetDriverByName(driver.c_str());
+  require(into != nullptr, "driver");
+  GDALDatasetH const copy =
+      GDALCreateCopy(into, to.c_str(), source, FALSE, nullptr, nullptr, nullptr);
+  require(copy != nullptr, "copy");
+  GDALClose(copy);
+  GDALClose(source);
 }
 
 std::unique_ptr<RasterSource> open_fixture(const std::string& path, const RasterFixture& fixture) {

@@ -34,6 +34,8 @@ struct RasterFixture {
   std::function<double(int, int)> value = [](int c, int r) { return 10.0 * r + c; };
   // Per-dataset mask, one for each pixel, 0 void; empty: none.
   std::vector<std::uint8_t> mask = {};
+  // Further bands, which hold 1 everywhere but 0 where column + row can be divided by seven.
+  int more_bands = 0;
 };
 
 // Adds a file to a zip archive, which is made where it is missing. Throws std::runtime_error.
@@ -41,6 +43,9 @@ void add_to_zip(const std::string& archive, const std::string& file);
 
 // Writes a GeoTIFF. Throws std::runtime_error.
 void write_raster(const std::string& path, const RasterFixture& fixture);
+
+// The same raster in another format, by the driver's name. Throws std::runtime_error.
+void copy_raster(const std::string& from, const std::string& to, const std::string& driver);
 
 std::unique_ptr<RasterSource> open_fixture(const std::string& path, const RasterFixture& fixture);
 std::vector<double> read_all(const RasterSource& source);

@@ -100,12 +100,14 @@ int run_build(const BuildArguments& arguments) {
   } else if (arguments.json) {
     text = write_report(result.report);
   } else {
-    text =
-        report_table(result.report) +
-        fmt::format("built: {} tiles, {} in {} (survey {:.1f} s, mesh {:.1f} s, peak memory {})\n",
-                    result.report.tiles, bytes_text(result.report.stored_bytes),
-                    options.output.path.string(), result.report.survey_s, result.report.mesh_s,
-                    bytes_text(result.report.peak_resident_bytes));
+    text = report_table(result.report) +
+           fmt::format(
+               "source: {}\n"
+               "built: {} tiles, {} in {} (survey {:.1f} s, mesh {:.1f} s, peak memory {})\n",
+               source_reads_text(result.report.source_reads), result.report.tiles,
+               bytes_text(result.report.stored_bytes), options.output.path.string(),
+               result.report.survey_s, result.report.mesh_s,
+               bytes_text(result.report.peak_resident_bytes));
   }
   std::fputs(text.c_str(), stdout);
   return 0;
