@@ -28,8 +28,8 @@ struct Hdf5LatticeOptions {
   std::int32_t max_zoom = 0;
   // Compressed blocks that wait for a segment, in bytes. DEFAULT: 16 MiB.
   std::int64_t segment_bytes = std::int64_t{16} << 20U;
-  // Decompressed blocks kept for the next read, in bytes. DEFAULT: 64 MiB.
-  std::int64_t cache_bytes = std::int64_t{64} << 20U;
+  // Decompressed blocks kept for the next read, in bytes. DEFAULT: 16 MiB.
+  std::int64_t cache_bytes = std::int64_t{16} << 20U;
   // zstd's. DEFAULT: 1 (terrain gets about 1 % smaller at 3, for 1.4 to 2.5 times the work).
   int compression_level = 1;
 };

@@ -15,6 +15,7 @@
 #include "pipeline/fingerprint.h"
 #include "pipeline/memory_share.h"
 #include "pipeline/mesh_pass.h"
+#include "pipeline/process_memory.h"
 #include "pipeline/run_record.h"
 #include "pipeline/scratch_folder.h"
 #include "pipeline/survey.h"
@@ -150,6 +151,7 @@ void place_store(SurveyOptions& survey, const MemoryShare& share, const BuildOpt
   survey.record = place.record.get();
   if (share.store_bytes == 0) return;
   survey.last_memory_zoom = share.last_memory_zoom;
+  survey.block_cache_bytes = share.block_cache_bytes;
   if (place.record == nullptr) place.scratch = std::make_unique<ScratchFolder>(options.output.path);
   survey.store_folder = place.record != nullptr ? place.record->folder() : place.scratch->path();
   progress.note(fmt::format(
@@ -182,6 +184,7 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
   const std::unique_ptr<TileSink> sink = open_sink(options, place);
   place_store(to_survey, share, options, place, progress);
   const Survey survey = run_survey(to_survey, progress);
+  give_back_freed_memory();
   require_data(survey);
   const BuildPlan plan = plan_build(options, survey);
   const Heightfield heightfield(*survey.store, survey.scheme, options.mesh.voids,

@@ -57,6 +57,33 @@ std::int64_t lattice_memory(const std::vector<std::int64_t>& blocks, std::int32_
   return bytes + 3 * store.segment_bytes + store.cache_bytes + on_disk * kIndexBytesPerBlock;
 }
 
+// So many rows of blocks do tiles touch between the first and the last time a block is read: the
+// schedule goes back by one row for every two that it goes on.
+constexpr std::int64_t kRowsOfBlocks = 5;
+
+// What the rows take at the deepest zoom.
+std::int64_t rows_of_blocks_bytes(const Lattice& lattice, const std::vector<RasterInfo>& sources) {
+  std::int64_t across = 0;
+  for (const RasterInfo& source : sources) {
+    const double posts = lattice.column_at(source.bounds_deg.east_deg) -
+                         lattice.column_at(source.bounds_deg.west_deg);
+    across += static_cast<std::int64_t>(posts / kBlockPosts) + 2;
+  }
+  across = std::min<std::int64_t>(across, lattice.columns() / kBlockPosts);
+  return kRowsOfBlocks * across * kBlockBytes;
+}
+
+// Gives memory that nobody else needs to the cache of the store on disk; a part stays free, because
+// the other numbers are estimates.
+void widen_block_cache(MemoryShare& share, std::int64_t limit_bytes, std::int64_t wanted_bytes) {
+  if (share.store_bytes == 0) return;
+  const std::int64_t least_bytes = Hdf5LatticeOptions().cache_bytes;
+  const std::int64_t free_bytes = limit_bytes - limit_bytes / 8 - share.plan.expected_peak_bytes;
+  share.block_cache_bytes =
+      std::clamp(wanted_bytes, least_bytes, least_bytes + std::max<std::int64_t>(0, free_bytes));
+  share.plan.expected_peak_bytes += share.block_cache_bytes - least_bytes;
+}
+
 struct Division {
   MemoryShare share;
   std::int64_t lattice_bytes = 0;
@@ -103,7 +130,12 @@ MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
     least = std::min(least, share.plan.smallest_limit_bytes);
     if (share.plan.fits) divisions.push_back({share, needs.lattice_bytes});
   }
-  if (!divisions.empty()) return choose(divisions, limit, needs.source_front_bytes);
+  if (!divisions.empty()) {
+    MemoryShare share = choose(divisions, limit, needs.source_front_bytes);
+    const Lattice lattice(survey.scheme, sampling_zoom);
+    widen_block_cache(share, limit, rows_of_blocks_bytes(lattice, sources));
+    return share;
+  }
   throw UsageError(fmt::format(
       "--memory: this work (sampling zoom {}) needs {} MiB or more, and the limit is {} MiB{}; "
       "give more, or less input, or a smaller --max-zoom where it is deeper than the pixels",

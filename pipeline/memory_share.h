@@ -15,6 +15,8 @@ struct MemoryShare {
   std::int32_t last_memory_zoom = 0;
   // What they take there at most (uncompressed; terrain packs to about half).
   std::int64_t store_bytes = 0;
+  // For blocks that are read back from there; a part of the plan's peak.
+  std::int64_t block_cache_bytes = 0;
 };
 
 // As many zooms as fit half the limit and leave the source its cache stay in memory, coarse ones

@@ -1,7 +1,6 @@
 #include "pipeline/report.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -89,14 +88,6 @@ std::string report_table(const BuildReport& report) {
 std::string source_reads_text(const SourceReads& reads) {
   return fmt::format("{} blocks, each decoded {:.2f} times", reads.blocks,
                      reads.decoded_per_block());
-}
-
-std::int64_t peak_resident_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  // glibc declares the field inside a union.
-  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-union-access)
-  return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
 }
 
 }  // namespace qmpipe

@@ -50,7 +50,4 @@ std::string report_table(const BuildReport& report);
 // "1234 blocks, each decoded 1.02 times"
 std::string source_reads_text(const SourceReads& reads);
 
-// The most memory this process has had so far.
-std::int64_t peak_resident_bytes();
-
 }  // namespace qmpipe

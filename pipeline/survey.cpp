@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <set>
 
 #include "formats/errors.h"
@@ -22,6 +23,7 @@
 namespace qmpipe {
 namespace {
 
+constexpr std::size_t kManyTiles = 2000;
 constexpr std::size_t kBlockSize = static_cast<std::size_t>(kBlockPosts) * kBlockPosts;
 
 // Blocks are named like tiles; row 2^zoom holds the last row of posts.
@@ -102,7 +104,9 @@ std::vector<BlockKey> covered_blocks(const TilingScheme& scheme, std::int32_t zo
 std::unique_ptr<LatticeStore> make_store(const SurveyOptions& options, std::int32_t max_zoom) {
   auto memory = make_memory_lattice_store(options.scheme, max_zoom);
   if (options.last_memory_zoom >= max_zoom) return memory;
-  auto disk = open_hdf5_lattice_store(options.store_folder, options.scheme, {.max_zoom = max_zoom});
+  auto disk =
+      open_hdf5_lattice_store(options.store_folder, options.scheme,
+                              {.max_zoom = max_zoom, .cache_bytes = options.block_cache_bytes});
   if (!disk) {
     throw IoError("cannot keep the lattice in", options.store_folder.string(), disk.error().message,
                   "remove the folder and run again");
@@ -289,9 +293,16 @@ void Surveyor::list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom
   const std::vector<TileKey> keys(candidates.begin(), candidates.end());
   auto& tiles = survey_.tiles[static_cast<std::size_t>(zoom)];
   tiles.resize(keys.size());
+  // Of the few of a coarse zoom nobody need be told.
+  std::optional<Phase> phase;
+  if (keys.size() >= kManyTiles) {
+    phase.emplace(progress_, fmt::format("survey of zoom {}", zoom), "tiles",
+                  static_cast<std::int64_t>(keys.size()));
+  }
   for_each_index(arena_, keys.size(), [&](std::size_t k) {
     progress_.check_stop();
     tiles[k] = examine(keys[k]);
+    progress_.advance(1);
   });
   std::erase_if(tiles, [](const SurveyedTile& tile) { return tile.valid_posts == 0; });
 }

@@ -40,6 +40,8 @@ struct SurveyOptions {
   std::int32_t last_memory_zoom = kMaxZoom;
   // Where the store on disk lives; needed when a zoom is kept there. Empty, or the record's folder.
   std::filesystem::path store_folder = {};
+  // Bounds the blocks that are kept in memory after they were read back from there.
+  std::int64_t block_cache_bytes = 16LL << 20U;
   // DEFAULT: none; nothing is written down, and what the folder holds must be nothing.
   RunRecord* record = nullptr;
   // Bounds the decoded source blocks that the threads share while they sample.

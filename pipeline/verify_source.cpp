@@ -109,6 +109,7 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
   if (share.store_bytes > 0) {
     scratch = std::make_unique<ScratchFolder>("");
     survey.last_memory_zoom = share.last_memory_zoom;
+    survey.block_cache_bytes = share.block_cache_bytes;
     survey.store_folder = scratch->path();
     progress.note(fmt::format("the lattice is kept in {}: at most {} of disk",
                               survey.store_folder.string(), bytes_text(share.store_bytes)));

@@ -29,28 +29,26 @@ MemoryPlan plan_memory(std::int64_t limit_bytes, const MemoryNeeds& needs) {
 
   MemoryPlan plan;
   plan.smallest_limit_bytes =
-      fixed + smallest_cache + std::max(bytes_per_sampler, kTileInFlightBytes);
+      fixed + std::max(smallest_cache + bytes_per_sampler, kTileInFlightBytes);
   plan.fits = limit_bytes == 0 || limit_bytes >= plan.smallest_limit_bytes;
   plan.source_cache_bytes =
       std::max({kComfortableCacheBytes, smallest_cache, needs.source_front_bytes});
   plan.sampling_threads = needs.threads;
   plan.max_in_flight = comfortable_in_flight(needs.threads);
-  // Sampling and meshing follow each other, so each may use what the other has given back.
-  const auto working_bytes = [&plan, bytes_per_sampler] {
-    return std::max(plan.sampling_threads * bytes_per_sampler,
-                    plan.max_in_flight * kTileInFlightBytes);
-  };
   if (limit_bytes > 0) {
-    // First the cache down to its least, then the tiles and samplers.
-    plan.source_cache_bytes =
-        std::clamp(limit_bytes - fixed - working_bytes(), smallest_cache, plan.source_cache_bytes);
-    const std::int64_t left = limit_bytes - fixed - plan.source_cache_bytes;
+    // First the cache down to its least, then the samplers.
+    const std::int64_t room_bytes = limit_bytes - fixed;
+    plan.source_cache_bytes = std::clamp(room_bytes - plan.sampling_threads * bytes_per_sampler,
+                                         smallest_cache, plan.source_cache_bytes);
+    plan.sampling_threads = static_cast<std::int32_t>(std::clamp<std::int64_t>(
+        (room_bytes - plan.source_cache_bytes) / bytes_per_sampler, 1, plan.sampling_threads));
     plan.max_in_flight = static_cast<std::int32_t>(
-        std::clamp<std::int64_t>(left / kTileInFlightBytes, 1, plan.max_in_flight));
-    plan.sampling_threads = static_cast<std::int32_t>(
-        std::clamp<std::int64_t>(left / bytes_per_sampler, 1, plan.sampling_threads));
+        std::clamp<std::int64_t>(room_bytes / kTileInFlightBytes, 1, plan.max_in_flight));
   }
-  plan.expected_peak_bytes = fixed + plan.source_cache_bytes + working_bytes();
+  // Sampling and meshing follow each other, so each may use what the other has given back.
+  plan.expected_peak_bytes =
+      fixed + std::max(plan.source_cache_bytes + plan.sampling_threads * bytes_per_sampler,
+                       plan.max_in_flight * kTileInFlightBytes);
   return plan;
 }
 

@@ -44,7 +44,7 @@ THIRD_PARTY = [
 # C++ standard headers have no suffix and no folder.
 STANDARD = re.compile(r"[a-z0-9_]+$")
 # The operating system's, for .cpp files only.
-SYSTEM = re.compile(r"((sys|linux)/\w+|dirent|errno|fcntl|poll|pthread|sched|signal|termios|time"
+SYSTEM = re.compile(r"((sys|linux)/\w+|dirent|errno|fcntl|malloc|poll|pthread|sched|signal|termios|time"
                     r"|unistd)\.h$")
 INCLUDE = re.compile(r'\s*#\s*include\s*([<"])([^>"]+)[>"]')
 

@@ -1,0 +1,18 @@
+#include "pipeline/process_memory.h"
+
+#include <malloc.h>
+#include <sys/resource.h>
+
+namespace qmpipe {
+
+std::int64_t peak_resident_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  // glibc declares the field inside a union.
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-union-access)
+  return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
+}
+
+void give_back_freed_memory() { malloc_trim(0); }
+
+}  // namespace qmpipe

@@ -1,0 +1,15 @@
+// The memory of this process, as the system sees it.
+#pragma once
+
+#include <cstdint>
+
+namespace qmpipe {
+
+// The most that was resident so far.
+std::int64_t peak_resident_bytes();
+
+// Gives what was freed back to the system, where the C library can: between two passes, so that the
+// second does not come on top of what the first has left.
+void give_back_freed_memory();
+
+}  // namespace qmpipe
