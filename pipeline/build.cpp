@@ -93,8 +93,8 @@ RectangleDeg united_bounds(const std::vector<RasterInfo>& sources) {
 LayerJson layer_for(const BuildOptions& options, const Survey& survey, const BuildPlan& plan,
                     const BuildReport& report) {
   LayerJson layer;
-  layer.name =
-      options.output.name.empty() ? options.output.path.filename().string() : options.output.name;
+  layer.name = options.output.name.empty() ? plain_path(options.output.path).filename().string()
+                                           : options.output.name;
   layer.description = options.output.description;
   layer.attribution = options.output.attribution;
   // Clients cache by version, so it changes when, and only when, a tile does.
@@ -116,14 +116,28 @@ struct RunPlace {
   std::unique_ptr<ScratchFolder> scratch;
 };
 
+std::filesystem::path run_folder(const BuildOptions& options) {
+  if (!options.output.run_folder.empty()) return options.output.run_folder;
+  return options.output.path.empty() ? std::filesystem::path() : run_folder_of(options.output.path);
+}
+
+void note_resumption(const RunRecord& record, Progress& progress) {
+  std::string done;
+  if (const auto zoom = record.coarsest_surveyed()) {
+    done += fmt::format(", the survey is done down to zoom {}", *zoom);
+  }
+  if (record.tiles().tiles_done > 0) {
+    done += fmt::format(", {} tiles are done", record.tiles().tiles_done);
+  }
+  progress.note(fmt::format("going on with the run in {}{}", record.folder().string(), done));
+}
+
 RunPlace open_place(const BuildOptions& options, Progress& progress) {
   RunPlace place;
   if (options.run.dry_run || options.run.checkpoint_s == 0) return place;
   place.record =
-      RunRecord::open(options.output.path, fingerprint_of(options), options.output.overwrite);
-  if (place.record->resumes()) {
-    progress.note(fmt::format("going on with the run in {}", place.record->folder().string()));
-  }
+      RunRecord::open(run_folder(options), fingerprint_of(options), options.output.overwrite);
+  if (place.record->resumes()) note_resumption(*place.record, progress);
   return place;
 }
 
@@ -152,7 +166,7 @@ void place_store(SurveyOptions& survey, const MemoryShare& share, const BuildOpt
   if (share.store_bytes == 0) return;
   survey.last_memory_zoom = share.last_memory_zoom;
   survey.block_cache_bytes = share.block_cache_bytes;
-  if (place.record == nullptr) place.scratch = std::make_unique<ScratchFolder>(options.output.path);
+  if (place.record == nullptr) place.scratch = std::make_unique<ScratchFolder>(run_folder(options));
   survey.store_folder = place.record != nullptr ? place.record->folder() : place.scratch->path();
   progress.note(fmt::format(
       "the lattice of the zooms deeper than {} is kept in {}: at most {} of disk",

@@ -65,6 +65,8 @@ struct RunOptions {
 
 struct OutputOptions {
   std::filesystem::path path;
+  // What a run keeps on disk until it is done. DEFAULT: empty, OUT.qmpipe-run.
+  std::filesystem::path run_folder;
   Overwrite overwrite = Overwrite::kNo;
   std::string name;
   std::string description;

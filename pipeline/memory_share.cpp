@@ -8,6 +8,7 @@
 
 #include "formats/errors.h"
 #include "formats/hdf5_lattice_store.h"
+#include "pipeline/block_cover.h"
 #include "pipeline/sampling_order.h"
 
 namespace qmpipe {

@@ -56,10 +56,13 @@ std::string listed(const std::vector<std::string>& sentences) {
 
 }  // namespace
 
+fs::path plain_path(const fs::path& path) {
+  const fs::path plain = fs::absolute(path).lexically_normal();
+  return plain.has_filename() ? plain : plain.parent_path();
+}
+
 fs::path run_folder_of(const fs::path& output) {
-  // "tiles/" and "tiles" are one folder.
-  const fs::path plain = output.has_filename() ? output : output.parent_path();
-  return plain.string() + ".qmpipe-run";
+  return plain_path(output).string() + ".qmpipe-run";
 }
 
 RunRecord::RunRecord(fs::path folder, std::unique_ptr<Journal> journal)
@@ -75,9 +78,8 @@ RunRecord::~RunRecord() {
   }
 }
 
-std::unique_ptr<RunRecord> RunRecord::open(const fs::path& output, const std::string& fingerprint,
+std::unique_ptr<RunRecord> RunRecord::open(const fs::path& folder, const std::string& fingerprint,
                                            Overwrite overwrite) {
-  const fs::path folder = run_folder_of(output);
   const bool has_journal = fs::exists(folder / kJournalName);
   if (has_journal && overwrite == Overwrite::kYes) {
     // Not under the feet of a run that is at work; whether the journal is sound does not matter.

@@ -1,6 +1,6 @@
 // What a run has finished, kept beside the output so that another run can go on from there.
 //
-// The run folder OUT.qmpipe-run holds a journal (formats/journal.h) and the stores' segments. The
+// The run folder holds a journal (formats/journal.h) and the stores' segments. The
 // journal's lines are JSON objects: first the run's fingerprint, then one for each zoom whose survey
 // is on disk, one for the plan of the mesh pass, and one for each checkpoint, which counts the tiles
 // that are safe: the first n of the schedule, whose order never changes. A folder that is kept when
@@ -30,10 +30,9 @@ struct TileCheckpoint {
 
 class RunRecord {
  public:
-  // Goes on with the run that `output`'s run folder tells of, or starts one; with kYes always starts
-  // one. Throws IoError, naming what differs, when the earlier run's fingerprint is another; when
+  // Goes on with the run that the folder tells of, or starts one; with kYes always starts one. Throws IoError, naming what differs, when the earlier run's fingerprint is another; when
   // something that the journal counts on is damaged or missing; when another run is at work there.
-  static std::unique_ptr<RunRecord> open(const std::filesystem::path& output,
+  static std::unique_ptr<RunRecord> open(const std::filesystem::path& folder,
                                          const std::string& fingerprint, Overwrite overwrite);
   // Removes the folder when nothing in it is worth going on with.
   ~RunRecord();
@@ -80,7 +79,10 @@ class RunRecord {
   TileCheckpoint tiles_;
 };
 
-// OUT.qmpipe-run.
+// The path as it stands in its folder: absolute, without a slash at the end.
+std::filesystem::path plain_path(const std::filesystem::path& path);
+
+// OUT.qmpipe-run, beside the output however that is written ("tiles", "tiles/", ".").
 std::filesystem::path run_folder_of(const std::filesystem::path& output);
 
 }  // namespace qmpipe

@@ -7,16 +7,14 @@
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
-#include "pipeline/run_record.h"
 
 namespace qmpipe {
 
 namespace fs = std::filesystem;
 
-ScratchFolder::ScratchFolder(const fs::path& output) {
-  const fs::path base =
-      output.empty() ? fs::temp_directory_path() / "qmpipe-run" : run_folder_of(output);
-  path_ = fmt::format("{}-{}", base.string(), getpid());
+ScratchFolder::ScratchFolder(const fs::path& base) {
+  const fs::path named = base.empty() ? fs::temp_directory_path() / "qmpipe-run" : base;
+  path_ = fmt::format("{}-{}", named.string(), getpid());
   std::error_code problem;
   fs::create_directories(path_, problem);
   if (problem) {

@@ -7,9 +7,8 @@ namespace qmpipe {
 
 class ScratchFolder {
  public:
-  // Beside the output, named after it and the process; without an output where the system keeps
-  // temporary files. Throws IoError.
-  explicit ScratchFolder(const std::filesystem::path& output);
+  // `base`-PID; without a base, where the system keeps temporary files. Throws IoError.
+  explicit ScratchFolder(const std::filesystem::path& base);
   ~ScratchFolder();
   ScratchFolder(const ScratchFolder&) = delete;
   ScratchFolder& operator=(const ScratchFolder&) = delete;

@@ -17,6 +17,7 @@
 #include "formats/hdf5_lattice_store.h"
 #include "formats/source_block_cache.h"
 #include "formats/tiered_lattice_store.h"
+#include "pipeline/block_cover.h"
 #include "pipeline/sampling_order.h"
 #include "scheduler/check.h"
 
@@ -25,9 +26,6 @@ namespace {
 
 constexpr std::size_t kManyTiles = 2000;
 constexpr std::size_t kBlockSize = static_cast<std::size_t>(kBlockPosts) * kBlockPosts;
-
-// Blocks are named like tiles; row 2^zoom holds the last row of posts.
-using BlockKey = TileKey;
 
 std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options,
                                       const std::shared_ptr<SourceBlockCache>& cache) {
@@ -41,13 +39,8 @@ std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options,
   return std::make_unique<Sampler>(std::move(sources), options.resampling);
 }
 
-// Runs body(k) for 0 <= k < count on the arena's threads; an exception ends the loop and comes out.
-template <class Body>
-void for_each_index(tbb::task_arena& arena, std::size_t count, const Body& body) {
-  arena.execute([&] { tbb::parallel_for(std::size_t{0}, count, body); });
-}
-
-// The same, but the threads take one k after the other, so that all work at one place.
+// Runs body(k) for 0 <= k < count on the arena's threads, which take one k after the other, so that
+// all work at one place. An exception ends the loop and comes out.
 template <class Body>
 void for_each_in_order(tbb::task_arena& arena, std::int32_t threads, std::size_t count,
                        const Body& body) {
@@ -58,47 +51,6 @@ void for_each_in_order(tbb::task_arena& arena, std::int32_t threads, std::size_t
     }
   };
   arena.execute([&] { tbb::parallel_for(0, threads, take, tbb::simple_partitioner()); });
-}
-
-// Columns first_x .. first_x + width - 1 (they wrap) and rows first_y .. first_y + height - 1.
-struct BlockSpan {
-  std::int32_t first_x = 0;
-  std::int32_t first_y = 0;
-  std::int32_t width = 0;
-  std::int32_t height = 0;
-};
-
-BlockSpan covered_span(const Lattice& lattice, const RasterInfo& source) {
-  const RectangleDeg& box = source.bounds_deg;
-  const auto block = [](double post) {
-    return static_cast<std::int32_t>(std::floor(post / kBlockPosts));
-  };
-  // A post of slack: bounds of projected rasters come from a finite number of edge points.
-  BlockSpan span;
-  span.first_x = block(lattice.column_at(box.west_deg) - 1);
-  span.width = std::min(block(lattice.column_at(box.east_deg) + 1) - span.first_x + 1,
-                        lattice.columns() / kBlockPosts);
-  span.first_y = std::max(0, block(lattice.row_at(box.south_deg) - 1));
-  const std::int32_t last_y =
-      std::min((lattice.rows() - 1) / kBlockPosts, block(lattice.row_at(box.north_deg) + 1));
-  span.height = std::max(0, last_y - span.first_y + 1);
-  return span;
-}
-
-std::vector<BlockKey> covered_blocks(const TilingScheme& scheme, std::int32_t zoom,
-                                     const std::vector<RasterInfo>& sources) {
-  const Lattice lattice(scheme, zoom);
-  const std::int32_t columns = scheme.columns(zoom);
-  std::set<BlockKey> blocks;
-  for (const RasterInfo& source : sources) {
-    const BlockSpan span = covered_span(lattice, source);
-    for (std::int32_t y = span.first_y; y < span.first_y + span.height; ++y) {
-      for (std::int32_t x = span.first_x; x < span.first_x + span.width; ++x) {
-        blocks.insert({.zoom = zoom, .x = (x % columns + columns) % columns, .y = y});
-      }
-    }
-  }
-  return {blocks.begin(), blocks.end()};
 }
 
 std::unique_ptr<LatticeStore> make_store(const SurveyOptions& options, std::int32_t max_zoom) {
@@ -113,23 +65,6 @@ std::unique_ptr<LatticeStore> make_store(const SurveyOptions& options, std::int3
   }
   return make_tiered_lattice_store(std::move(memory), options.last_memory_zoom,
                                    std::move(disk.value()));
-}
-
-// The blocks of the next coarser zoom that may have a valid post where the given ones do: a coarse
-// post looks at finer posts one step to each side, so the last row and column of an odd block count
-// in the next block too.
-std::vector<BlockKey> coarser_blocks(const TilingScheme& scheme,
-                                     const std::vector<BlockKey>& blocks) {
-  std::set<BlockKey> coarser;
-  for (const BlockKey& block : blocks) {
-    const std::int32_t zoom = block.zoom - 1;
-    for (const std::int32_t y : {block.y / 2, (block.y + 1) / 2}) {
-      for (const std::int32_t x : {block.x / 2, (block.x + 1) / 2}) {
-        coarser.insert({.zoom = zoom, .x = x % scheme.columns(zoom), .y = y});
-      }
-    }
-  }
-  return {coarser.begin(), coarser.end()};
 }
 
 void keep_present(const LatticeStore& store, std::vector<BlockKey>& blocks) {
@@ -201,7 +136,7 @@ void Surveyor::sample(std::vector<BlockKey>& blocks) {
 }
 
 void Surveyor::reduce_to(std::vector<BlockKey>& blocks) {
-  for_each_index(arena_, blocks.size(), [&](std::size_t k) {
+  for_each_in_order(arena_, options_.threads, blocks.size(), [&](std::size_t k) {
     progress_.check_stop();
     const BlockKey& block = blocks[k];
     if (is_done_already(block)) return;
@@ -299,7 +234,7 @@ void Surveyor::list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom
     phase.emplace(progress_, fmt::format("survey of zoom {}", zoom), "tiles",
                   static_cast<std::int64_t>(keys.size()));
   }
-  for_each_index(arena_, keys.size(), [&](std::size_t k) {
+  for_each_in_order(arena_, options_.threads, keys.size(), [&](std::size_t k) {
     progress_.check_stop();
     tiles[k] = examine(keys[k]);
     progress_.advance(1);
@@ -395,18 +330,6 @@ std::vector<RasterInfo> describe_inputs(const SurveyOptions& options) {
 Survey run_survey(const SurveyOptions& options, Progress& progress) {
   QMPIPE_CHECK(options.threads >= 1);
   return Surveyor(options, progress).run();
-}
-
-std::int64_t expected_blocks(const TilingScheme& scheme, std::int32_t zoom,
-                             const std::vector<RasterInfo>& sources) {
-  // Counted, not listed: a zoom may be asked for that has more blocks than any memory holds keys.
-  const Lattice lattice(scheme, zoom);
-  std::int64_t blocks = 0;
-  for (const RasterInfo& source : sources) {
-    const BlockSpan span = covered_span(lattice, source);
-    blocks += static_cast<std::int64_t>(span.width) * span.height;
-  }
-  return blocks;
 }
 
 }  // namespace qmpipe

@@ -71,8 +71,4 @@ std::vector<RasterInfo> describe_inputs(const SurveyOptions& options);
 
 Survey run_survey(const SurveyOptions& options, Progress& progress);
 
-// How many blocks of one zoom these sources touch at most.
-std::int64_t expected_blocks(const TilingScheme& scheme, std::int32_t zoom,
-                             const std::vector<RasterInfo>& sources);
-
 }  // namespace qmpipe

@@ -293,6 +293,20 @@ class StoppedRuns(ResumeTest):
         self.assertIn("is finished", done.stderr)
         self.finish(out, "--overwrite")
 
+    def test_the_run_folder_may_stand_elsewhere(self):
+        out = self.root / "elsewhere"
+        folder = self.root / "scratch" / "run"
+        process = self.start(out, "--run-folder", str(folder))
+        self.assertTrue(self.wait_for_tiles(process, out))
+        process.send_signal(signal.SIGINT)
+        process.wait(timeout=60)
+        self.assertEqual(process.returncode, 130)
+        self.assertTrue((folder / "journal").exists())
+        self.assertFalse(run_folder(out).exists())
+        done = self.finish(out, "--run-folder", str(folder))
+        self.assertRegex(done.stderr, r"going on with the run in .*run, \d+ tiles are done")
+        self.assertFalse(folder.exists())
+
     def test_without_checkpoints_nothing_is_kept(self):
         out = self.root / "none"
         process = self.start(out, "--checkpoint", "0", "--memory", LITTLE_MEMORY)

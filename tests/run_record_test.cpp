@@ -25,7 +25,8 @@ class RunRecordTest : public ::testing::Test {
     testing::write_raster(options_.input.paths[0], {});
   }
   std::unique_ptr<RunRecord> open(Overwrite overwrite = Overwrite::kNo) const {
-    return RunRecord::open(options_.output.path, fingerprint_of(options_), overwrite);
+    return RunRecord::open(run_folder_of(options_.output.path), fingerprint_of(options_),
+                           overwrite);
   }
   std::string refusal() const {
     try {
@@ -71,6 +72,15 @@ TEST_F(RunRecordTest, WhatWasDoneIsThereInTheNextRun) {
   EXPECT_THROW(record->set_plan(R"({"recipe":{},"tiles":8})"), IoError);
   record->finish(false);
   EXPECT_FALSE(has_folder());
+}
+
+TEST(RunFolder, StandsBesideTheOutputHoweverThatIsWritten) {
+  const std::filesystem::path here = std::filesystem::current_path();
+  EXPECT_EQ(run_folder_of("tiles"), here / "tiles.qmpipe-run");
+  EXPECT_EQ(run_folder_of("tiles/"), here / "tiles.qmpipe-run");
+  EXPECT_EQ(run_folder_of("a/../tiles/."), here / "tiles.qmpipe-run");
+  EXPECT_EQ(run_folder_of("."), here.string() + ".qmpipe-run");
+  EXPECT_EQ(run_folder_of("/data/tiles"), "/data/tiles.qmpipe-run");
 }
 
 TEST_F(RunRecordTest, EveryParameterThatDecidesBytesIsNamedWhenItDiffers) {

@@ -201,8 +201,12 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
                   "run starts again")
       ->capture_default_str()
       ->type_name("S");
+  command
+      .add_option("--run-folder", options.output.run_folder,
+                  "Folder for checkpoints and stores while the run lasts (default: OUT.qmpipe-run)")
+      ->type_name("DIR");
   command.add_flag("--keep-run", options.run.keep_run,
-                   "Leave OUT.qmpipe-run with its stores when the tiles are done");
+                   "Leave the run folder with its stores when the tiles are done");
   command.add_flag("--dry-run", options.run.dry_run,
                    "Stop after the estimate: tiles, size, time, memory");
   command.add_flag("--json", arguments.json,
