@@ -33,8 +33,9 @@ struct MemoryPlan {
   std::int64_t expected_peak_bytes = 0;
 };
 
-// What the process takes before it does anything: code, libraries, PROJ's database.
-inline constexpr std::int64_t kProgramBytes = 80LL << 20U;
+// What the process takes before it does anything (code, libraries, PROJ's database), and what its heap
+// keeps of what was freed.
+inline constexpr std::int64_t kProgramBytes = 88LL << 20U;
 // One tile with its window, heap of candidates, mesh and bytes, at the most vertices it can have.
 inline constexpr std::int64_t kTileInFlightBytes = 8LL << 20U;
 // What a thread holds while it samples: a source window in doubles, anchors, a block of posts.

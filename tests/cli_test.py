@@ -116,8 +116,9 @@ class Cli(unittest.TestCase):
         out = self.root / "dry"
         done = run("build", self.dem, "-o", out, "--dry-run")
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertRegex(done.stdout, r"estimate: \d+ tiles")
+        self.assertRegex(done.stdout, r"estimate: \d+ tiles.* of memory and .* of disk")
         self.assertFalse(out.exists())
+        self.assertEqual(list(self.root.glob("dry*")), [])
 
     def test_existing_output_is_refused_with_the_remedy(self):
         self.fails(1, "build", self.dem, "-o", self.tiles, says=["--overwrite"])
@@ -142,6 +143,10 @@ class Cli(unittest.TestCase):
         self.fails(2, "build", self.dem, "-o", out, "--nodata", "zero", says=["pull"])
         self.fails(2, "build", self.dem, "-o", out, "--memory", "lots", says=["512M"])
         self.fails(2, "build", self.dem, "-o", out, "--memory", "1M", says=["MiB or more"])
+        self.fails(2, "build", self.dem, "-o", out, "--checkpoint", "-1", says=["--checkpoint"])
+        self.fails(2, "build", self.dem, "-o", out, "--checkpoint", "nan", says=["--checkpoint"])
+        self.fails(2, "build", self.dem, "-o", out, "--keep-run", "--checkpoint", "0",
+                   says=["--keep-run needs checkpoints"])
         self.fails(2, "build", self.dem, "-o", out, "--tolerance-at", "9:3", says=["9=20"])
         self.fails(2, "build", self.dem, "-o", out, "--min-zoom", "5", "--max-zoom", "2",
                    says=["--max-zoom"])
