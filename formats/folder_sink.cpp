@@ -140,7 +140,8 @@ class FolderSink final : public TileSink {
     sync();
     const std::string text = write_layer_json(layer);
     const std::vector<std::uint8_t> bytes(text.begin(), text.end());
-    write_file_atomically(folder_ / "layer.json", bytes);
+    // Whoever sees that the set is whole may remove what it could be resumed from.
+    write_file_durably(folder_ / "layer.json", bytes);
     is_closed_ = true;
   }
 

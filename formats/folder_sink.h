@@ -1,6 +1,6 @@
 // A tile set as a folder: {z}/{x}/{y}.terrain and layer.json, ready for any static server.
 // Every file is written under a temporary name and renamed, so a file that has its name is whole.
-// close() syncs the tiles to disk before it writes layer.json.
+// close() syncs the tiles to disk before it writes layer.json; on return that is on the disk too.
 // A folder that is removed or replaced while the sink is open is noticed: by the next tile in a new
 // column, by sync() and by close(), which throw IoError.
 #pragma once

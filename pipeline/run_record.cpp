@@ -30,6 +30,8 @@ void make_folder(const fs::path& folder) {
   std::error_code code;
   fs::create_directories(folder, code);
   if (code) throw_folder_error("cannot make the run's folder", folder, code);
+  // Else a power cut could take the folder away and leave the tiles.
+  sync_folder_of(plain_path(folder));
 }
 
 void remove_folder(const fs::path& folder) {
