@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <system_error>
+#include <vector>
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
@@ -34,10 +35,32 @@ void make_folder(const fs::path& folder) {
   sync_folder_of(plain_path(folder));
 }
 
-void remove_folder(const fs::path& folder) {
+// Whatever else stands in a folder that the user has named is the user's.
+bool is_own_file(const fs::path& path) {
+  const std::string name = path.filename().string();
+  const bool is_segment = name.starts_with("lattice-") || name.starts_with("borders-");
+  return name == kJournalName || (is_segment && name.ends_with(".h5")) ||
+         (name.starts_with("survey-") && name.ends_with(".qms")) ||
+         name.ends_with(kTemporarySuffix);
+}
+
+// The journal first: a crash in between leaves a folder that claims nothing. The folder goes too
+// when this empties it.
+void remove_own_files(const fs::path& folder) {
   std::error_code code;
-  fs::remove_all(folder, code);
-  if (code) throw_folder_error("cannot remove the run's folder", folder, code);
+  if (!fs::exists(folder, code)) return;
+  fs::remove(folder / kJournalName, code);
+  std::vector<fs::path> own;
+  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    if (is_own_file(it->path())) own.push_back(it->path());
+  }
+  for (const fs::path& path : own) {
+    if (!code) fs::remove(path, code);
+  }
+  if (!code) fs::remove(folder, code);
+  if (code && code != std::errc::directory_not_empty) {
+    throw_folder_error("cannot clear the run's folder", folder, code);
+  }
 }
 
 std::unique_ptr<Journal> open_journal(const fs::path& folder) {
@@ -72,9 +95,7 @@ RunRecord::RunRecord(fs::path folder, std::unique_ptr<Journal> journal)
 
 RunRecord::~RunRecord() {
   try {
-    if (is_kept_ || is_worth_keeping()) return;
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
+    if (!is_kept_ && !is_worth_keeping()) remove_own_files(folder_);
   } catch (const std::exception&) {
     // The folder cannot even be listed: left as it is.
   }
@@ -88,7 +109,7 @@ std::unique_ptr<RunRecord> RunRecord::open(const fs::path& folder, const std::st
     static_cast<void>(Journal::open(folder / kJournalName));
   }
   // Without a journal it is the rest of a run that was done and could not clear up.
-  if (!has_journal || overwrite == Overwrite::kYes) remove_folder(folder);
+  if (!has_journal || overwrite == Overwrite::kYes) remove_own_files(folder);
   std::unique_ptr<RunRecord> record(new RunRecord(folder, open_journal(folder)));
   // Whatever is wrong with an earlier run's folder, it is the user's to remove.
   record->is_kept_ = !record->journal_->lines().empty();
@@ -203,11 +224,7 @@ void RunRecord::finish(bool keep) {
     journal_->append(json{{"finished", true}}.dump());
     return;
   }
-  // The journal first: a crash in between leaves a folder that claims nothing.
-  std::error_code code;
-  fs::remove(folder_ / kJournalName, code);
-  if (!code) fs::remove_all(folder_, code);
-  if (code) throw_folder_error("cannot remove the run's folder", folder_, code);
+  remove_own_files(folder_);
 }
 
 }  // namespace qmpipe

@@ -5,7 +5,8 @@
 // is on disk, one for the plan of the mesh pass, and one for each checkpoint, which counts the tiles
 // that are safe: the first n of the schedule, whose order never changes. A folder that is kept when
 // all is done ends with a line that says so.
-// Guarantees: nothing is counted before it is on disk. What a crash cut off is done again.
+// Guarantees: nothing is counted before it is on disk. What a crash cut off is done again. Of the
+// folder, only files of a run are ever removed.
 // Used by one thread at a time.
 #pragma once
 

@@ -83,6 +83,20 @@ TEST(RunFolder, StandsBesideTheOutputHoweverThatIsWritten) {
   EXPECT_EQ(run_folder_of("/data/tiles"), "/data/tiles.qmpipe-run");
 }
 
+TEST_F(RunRecordTest, WhatElseStandsInTheFolderStays) {
+  folder_.put("out.qmpipe-run/notes.txt", "mine");
+  folder_.put("out.qmpipe-run/data/lattice-000000.h5", "mine too");
+  folder_.put("out.qmpipe-run/lattice-000003.h5", "left by a run that could not clear up");
+  open();
+  EXPECT_FALSE(folder_.has("out.qmpipe-run/lattice-000003.h5"));
+  open()->add_tiles(checkpoint(3));
+  EXPECT_TRUE(folder_.has("out.qmpipe-run/journal"));
+  open(Overwrite::kYes)->finish(false);
+  EXPECT_FALSE(folder_.has("out.qmpipe-run/journal"));
+  EXPECT_EQ(folder_.get("out.qmpipe-run/notes.txt"), "mine");
+  EXPECT_EQ(folder_.get("out.qmpipe-run/data/lattice-000000.h5"), "mine too");
+}
+
 TEST_F(RunRecordTest, EveryParameterThatDecidesBytesIsNamedWhenItDiffers) {
   open()->add_tiles(checkpoint(3));
   const BuildOptions same = options_;
