@@ -78,8 +78,7 @@ void write_and_rename(const std::filesystem::path& path, std::span<const std::ui
   if (error == 0 && sync == Sync::kYes) {
     error = sync_folder(path);
   }
-  if (error == 0) return;
-  throw IoError("cannot write", path.string(), text_of_errno(error), remedy_for_errno(error));
+  if (error != 0) throw_io_error("cannot write", path, error);
 }
 
 // An open regular file, or why it is none.
@@ -151,6 +150,12 @@ std::string remedy_for_errno(int error_number) {
   }
 }
 
+void throw_io_error(const std::string& what_failed, const std::filesystem::path& path,
+                    int error_number) {
+  throw IoError(what_failed, path.string(), text_of_errno(error_number),
+                remedy_for_errno(error_number));
+}
+
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
   write_and_rename(path, bytes, Sync::kNo);
 }
@@ -161,9 +166,7 @@ void write_file_durably(const std::filesystem::path& path, std::span<const std::
 
 void sync_folder_of(const std::filesystem::path& path) {
   const int error = sync_folder(path);
-  if (error == 0) return;
-  throw IoError("cannot sync the folder of", path.string(), text_of_errno(error),
-                remedy_for_errno(error));
+  if (error != 0) throw_io_error("cannot sync the folder of", path, error);
 }
 
 Result<std::vector<std::uint8_t>> read_file_bytes(const std::filesystem::path& path,

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "formats/result.h"
@@ -36,5 +37,9 @@ Result<std::vector<std::uint8_t>> read_file_range(const std::filesystem::path& p
 // "free some space or choose another disk" and the like, for an errno value; empty for reasons that
 // explain themselves.
 std::string remedy_for_errno(int error_number);
+
+// An IoError with the system's reason and that remedy.
+[[noreturn]] void throw_io_error(const std::string& what_failed, const std::filesystem::path& path,
+                                 int error_number);
 
 }  // namespace qmpipe

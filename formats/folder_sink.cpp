@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "formats/errors.h"
+#include "formats/folders.h"
 #include "formats/tile_path.h"
 #include "scheduler/check.h"
 
@@ -20,27 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void throw_io_error(const char* what_failed, const fs::path& path,
-                                 const std::error_code& code) {
-  throw IoError(what_failed, path.string(), code.message(), remedy_for_errno(code.value()));
-}
-
-void make_folders(const fs::path& folder) {
-  std::error_code code;
-  fs::create_directories(folder, code);
-  if (code) throw_io_error("cannot create the folder", folder, code);
-}
-
-std::vector<fs::directory_entry> entries_of(const fs::path& folder) {
-  std::error_code code;
-  std::vector<fs::directory_entry> entries;
-  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
-    entries.push_back(*it);
-  }
-  if (code) throw_io_error("cannot list the folder", folder, code);
-  return entries;
-}
-
 bool is_temporary(const fs::path& path) { return path.string().ends_with(kTemporarySuffix); }
 
 // Symbolic links are not followed: what they point to is not ours.
@@ -48,20 +28,6 @@ bool is_own_folder(const fs::directory_entry& entry) {
   std::error_code code;
   return entry.symlink_status(code).type() == fs::file_type::directory &&
          parse_tile_number(entry.path().filename().string()).has_value();
-}
-
-void remove_file(const fs::path& path) {
-  std::error_code code;
-  fs::remove(path, code);
-  if (code) throw_io_error("cannot remove", path, code);
-}
-
-void remove_folder_if_empty(const fs::path& folder) {
-  std::error_code code;
-  fs::remove(folder, code);
-  if (code && code != std::errc::directory_not_empty) {
-    throw_io_error("cannot remove the folder", folder, code);
-  }
 }
 
 void remove_tiles_of_column(const fs::path& x_folder) {
@@ -89,9 +55,7 @@ void sync_file_system_of(const fs::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const int error = descriptor < 0 || ::syncfs(descriptor) != 0 ? errno : 0;
   if (descriptor >= 0) ::close(descriptor);
-  if (error != 0) {
-    throw_io_error("cannot sync", folder, std::error_code(error, std::generic_category()));
-  }
+  if (error != 0) throw_io_error("cannot sync", folder, error);
 }
 
 // What tells a folder from another one of the same name.
@@ -176,8 +140,7 @@ std::unique_ptr<TileSink> open_folder_sink(const fs::path& folder, Overwrite ove
 std::unique_ptr<TileSink> resume_folder_sink(const fs::path& folder) {
   make_folders(folder);
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
-    throw_io_error("cannot write to the folder", folder,
-                   std::error_code(errno, std::generic_category()));
+    throw_io_error("cannot write to the folder", folder, errno);
   }
   return std::make_unique<FolderSink>(folder);
 }

@@ -46,12 +46,6 @@ std::optional<SplitLine> split_line(std::span<const std::uint8_t> line) {
   return split;
 }
 
-[[noreturn]] void throw_io_error(const char* what_failed, const std::filesystem::path& path,
-                                 int error) {
-  throw IoError(what_failed, path.string(), std::generic_category().message(error),
-                remedy_for_errno(error));
-}
-
 // 0 or errno.
 int write_whole(int descriptor, std::string_view bytes, std::size_t offset) {
   while (!bytes.empty()) {

@@ -7,10 +7,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
 
-#include "formats/errors.h"
 #include "formats/file_bytes.h"
+#include "formats/folders.h"
 
 namespace qmpipe {
 namespace {
@@ -49,21 +48,6 @@ bool is_torn_segment(const fs::path& path, SegmentKind kind) {
   return name.starts_with(prefix_of(kind)) && name.ends_with(kTemporarySuffix);
 }
 
-[[noreturn]] void throw_io_error(const char* what_failed, const fs::path& path,
-                                 const std::error_code& code) {
-  throw IoError(what_failed, path.string(), code.message(), remedy_for_errno(code.value()));
-}
-
-std::vector<fs::path> files_of(const fs::path& folder) {
-  std::error_code code;
-  std::vector<fs::path> files;
-  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
-    files.push_back(it->path());
-  }
-  if (code) throw_io_error("cannot list the folder", folder, code);
-  return files;
-}
-
 }  // namespace
 
 fs::path segment_path(const fs::path& folder, SegmentKind kind, std::int32_t number) {
@@ -72,8 +56,8 @@ fs::path segment_path(const fs::path& folder, SegmentKind kind, std::int32_t num
 
 std::vector<std::int32_t> segment_numbers(const fs::path& folder, SegmentKind kind) {
   std::vector<std::int32_t> numbers;
-  for (const fs::path& file : files_of(folder)) {
-    if (const auto number = segment_number(file, kind)) numbers.push_back(*number);
+  for (const fs::directory_entry& file : entries_of(folder)) {
+    if (const auto number = segment_number(file.path(), kind)) numbers.push_back(*number);
   }
   std::sort(numbers.begin(), numbers.end());
   return numbers;
@@ -92,12 +76,16 @@ Result<std::int32_t> count_without_gaps(const fs::path& folder, SegmentKind kind
 }
 
 void prepare_segment_folder(const fs::path& folder, SegmentKind kind) {
-  std::error_code code;
-  fs::create_directories(folder, code);
-  if (code) throw_io_error("cannot create the folder", folder, code);
-  for (const fs::path& file : files_of(folder)) {
-    if (is_torn_segment(file, kind)) fs::remove(file, code);
-    if (code) throw_io_error("cannot remove", file, code);
+  make_folders(folder);
+  for (const fs::directory_entry& file : entries_of(folder)) {
+    if (is_torn_segment(file.path(), kind)) remove_file(file.path());
+  }
+}
+
+void remove_segments(const fs::path& folder, SegmentKind kind) {
+  for (const fs::directory_entry& file : entries_of(folder)) {
+    const fs::path& path = file.path();
+    if (is_torn_segment(path, kind) || segment_number(path, kind)) remove_file(path);
   }
 }
 

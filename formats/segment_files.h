@@ -35,4 +35,7 @@ Result<std::int32_t> count_without_gaps(const std::filesystem::path& folder, Seg
 // Makes the folder when it is absent, and removes what interrupted writes of such segments left.
 void prepare_segment_folder(const std::filesystem::path& folder, SegmentKind kind);
 
+// And what interrupted writes of such segments left; other files stay.
+void remove_segments(const std::filesystem::path& folder, SegmentKind kind);
+
 }  // namespace qmpipe

@@ -7,6 +7,7 @@
 
 #include "formats/file_bytes.h"
 #include "formats/file_seal.h"
+#include "formats/folders.h"
 #include "formats/little_endian.h"
 #include "scheduler/lattice.h"
 
@@ -80,6 +81,14 @@ void write_survey_file(const std::filesystem::path& path, std::int32_t zoom,
   }
   append_seal(bytes, {});
   write_file_durably(path, bytes);
+}
+
+void remove_survey_files(const std::filesystem::path& folder) {
+  for (std::int32_t zoom = 0; zoom <= kMaxZoom; ++zoom) {
+    const std::filesystem::path path = survey_file_path(folder, zoom);
+    remove_file(path);
+    remove_file(path.string() + kTemporarySuffix);
+  }
 }
 
 Result<SurveyedZoom> parse_surveyed_zoom(std::span<const std::uint8_t> bytes, std::int32_t zoom,

@@ -40,6 +40,9 @@ std::filesystem::path survey_file_path(const std::filesystem::path& folder, std:
 void write_survey_file(const std::filesystem::path& path, std::int32_t zoom,
                        const SurveyedZoom& surveyed);
 
+// Of every zoom, and what interrupted writes of them left; other files stay. Throws IoError.
+void remove_survey_files(const std::filesystem::path& folder);
+
 // Refuses anything but what was written for this zoom; the message names the file.
 Result<SurveyedZoom> read_survey_file(const std::filesystem::path& path, std::int32_t zoom,
                                       const TilingScheme& scheme);

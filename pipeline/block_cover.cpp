@@ -5,16 +5,6 @@
 #include <set>
 
 namespace qmpipe {
-namespace {
-
-// Columns first_x .. first_x + width - 1 (they wrap) and rows first_y .. first_y + height - 1.
-struct BlockSpan {
-  std::int32_t first_x = 0;
-  std::int32_t first_y = 0;
-  std::int32_t width = 0;
-  std::int32_t height = 0;
-};
-
 BlockSpan covered_span(const Lattice& lattice, const RasterInfo& source) {
   const RectangleDeg& box = source.bounds_deg;
   const auto block = [](double post) {
@@ -31,8 +21,6 @@ BlockSpan covered_span(const Lattice& lattice, const RasterInfo& source) {
   span.height = std::max(0, last_y - span.first_y + 1);
   return span;
 }
-
-}  // namespace
 
 std::vector<BlockKey> covered_blocks(const TilingScheme& scheme, std::int32_t zoom,
                                      const std::vector<RasterInfo>& sources) {

@@ -13,6 +13,24 @@ namespace qmpipe {
 // Blocks are named like tiles; row 2^zoom holds the last row of posts.
 using BlockKey = TileKey;
 
+inline PostWindow posts_of(const BlockKey& block) {
+  return {.i0 = block.x * kBlockPosts,
+          .j0 = block.y * kBlockPosts,
+          .width_posts = kBlockPosts,
+          .height_posts = kBlockPosts};
+}
+
+// Columns first_x .. first_x + width - 1 (they wrap) and rows first_y .. first_y + height - 1.
+struct BlockSpan {
+  std::int32_t first_x = 0;
+  std::int32_t first_y = 0;
+  std::int32_t width = 0;
+  std::int32_t height = 0;
+};
+
+// Every block in which the source may have a valid post.
+BlockSpan covered_span(const Lattice& lattice, const RasterInfo& source);
+
 // Sorted, none twice: every block that may have a valid post is among them.
 std::vector<BlockKey> covered_blocks(const TilingScheme& scheme, std::int32_t zoom,
                                      const std::vector<RasterInfo>& sources);

@@ -65,11 +65,7 @@ constexpr std::int64_t kRowsOfBlocks = 5;
 // What the rows take at the deepest zoom.
 std::int64_t rows_of_blocks_bytes(const Lattice& lattice, const std::vector<RasterInfo>& sources) {
   std::int64_t across = 0;
-  for (const RasterInfo& source : sources) {
-    const double posts = lattice.column_at(source.bounds_deg.east_deg) -
-                         lattice.column_at(source.bounds_deg.west_deg);
-    across += static_cast<std::int64_t>(posts / kBlockPosts) + 2;
-  }
+  for (const RasterInfo& source : sources) across += covered_span(lattice, source).width;
   across = std::min<std::int64_t>(across, lattice.columns() / kBlockPosts);
   return kRowsOfBlocks * across * kBlockBytes;
 }

@@ -81,10 +81,8 @@ BuildReport resumed_report(const BuildReport& empty, const BuildPlan& plan, cons
   }
   auto report = with_report_state(empty, tiles.report_state);
   if (!report || report->tiles != tiles.tiles_done) {
-    throw IoError(
-        "cannot go on with the run in", record.folder().string(),
-        report ? "its statistics count other tiles than its journal" : report.error().message,
-        "Build with --overwrite to start over.");
+    record.refuse(report ? "its statistics count other tiles than its journal"
+                         : report.error().message);
   }
   report->resumed_tiles = tiles.tiles_done;
   progress.note(

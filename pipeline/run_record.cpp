@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <system_error>
 #include <vector>
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
+#include "formats/folders.h"
 #include "formats/hdf5_border_store.h"
 #include "formats/hdf5_lattice_store.h"
+#include "formats/segment_files.h"
 #include "pipeline/fingerprint.h"
 
 namespace qmpipe {
@@ -20,56 +21,34 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr const char* kJournalName = "journal";
-constexpr const char* kStartOver = "Build with --overwrite to start over.";
 
-[[noreturn]] void throw_folder_error(const char* what_failed, const fs::path& folder,
-                                     const std::error_code& code) {
-  throw IoError(what_failed, folder.string(), code.message(), remedy_for_errno(code.value()));
-}
-
-void make_folder(const fs::path& folder) {
-  std::error_code code;
-  fs::create_directories(folder, code);
-  if (code) throw_folder_error("cannot make the run's folder", folder, code);
+void make_run_folder(const fs::path& folder) {
+  make_folders(folder);
   // Else a power cut could take the folder away and leave the tiles.
   sync_folder_of(plain_path(folder));
 }
 
-// Whatever else stands in a folder that the user has named is the user's.
-bool is_own_file(const fs::path& path) {
-  const std::string name = path.filename().string();
-  const bool is_segment = name.starts_with("lattice-") || name.starts_with("borders-");
-  return name == kJournalName || (is_segment && name.ends_with(".h5")) ||
-         (name.starts_with("survey-") && name.ends_with(".qms")) ||
-         name.ends_with(kTemporarySuffix);
+// Whatever else stands in a folder that the user has named is the user's. The journal goes first: a
+// crash in between leaves a folder that claims nothing.
+void remove_own_files(const fs::path& folder) {
+  if (!fs::exists(folder)) return;
+  remove_file(folder / kJournalName);
+  for (const SegmentKind kind : {SegmentKind::kLattice, SegmentKind::kBorders}) {
+    remove_segments(folder, kind);
+  }
+  remove_survey_files(folder);
+  remove_folder_if_empty(folder);
 }
 
-// The journal first: a crash in between leaves a folder that claims nothing. The folder goes too
-// when this empties it.
-void remove_own_files(const fs::path& folder) {
-  std::error_code code;
-  if (!fs::exists(folder, code)) return;
-  fs::remove(folder / kJournalName, code);
-  std::vector<fs::path> own;
-  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
-    if (is_own_file(it->path())) own.push_back(it->path());
-  }
-  for (const fs::path& path : own) {
-    if (!code) fs::remove(path, code);
-  }
-  if (!code) fs::remove(folder, code);
-  if (code && code != std::errc::directory_not_empty) {
-    throw_folder_error("cannot clear the run's folder", folder, code);
-  }
+[[noreturn]] void refuse_run(const fs::path& folder, const std::string& cause) {
+  throw IoError("cannot go on with the run in", folder.string(), cause,
+                "Build with --overwrite to start over.");
 }
 
 std::unique_ptr<Journal> open_journal(const fs::path& folder) {
-  make_folder(folder);
+  make_run_folder(folder);
   auto journal = Journal::open(folder / kJournalName);
-  if (!journal) {
-    throw IoError("cannot go on with the run in", folder.string(), journal.error().message,
-                  kStartOver);
-  }
+  if (!journal) refuse_run(folder, journal.error().message);
   return std::move(journal.value());
 }
 
@@ -119,6 +98,8 @@ std::unique_ptr<RunRecord> RunRecord::open(const fs::path& folder, const std::st
   return record;
 }
 
+void RunRecord::refuse(const std::string& cause) const { refuse_run(folder_, cause); }
+
 void RunRecord::read_lines(const std::string& fingerprint) {
   const std::vector<std::string>& lines = journal_->lines();
   resumes_ = !lines.empty();
@@ -128,12 +109,10 @@ void RunRecord::read_lines(const std::string& fingerprint) {
   }
   for (std::size_t k = 1; k < lines.size(); ++k) {
     if (read_line(lines[k])) continue;
-    throw IoError("cannot go on with the run in", folder_.string(),
-                  fmt::format("line {} of its journal says nothing that this version knows", k + 1),
-                  kStartOver);
+    refuse(fmt::format("line {} of its journal says nothing that this version knows", k + 1));
   }
   if (is_finished_) {
-    throw IoError("cannot go on with the run in", folder_.string(), "it is finished", kStartOver);
+    refuse("it is finished");
   }
   const auto differences = fingerprint_differences(lines.front(), fingerprint);
   if (differences.empty()) return;
@@ -165,14 +144,14 @@ bool RunRecord::read_line(const std::string& line) try {
 void RunRecord::check_stores() const {
   const auto require = [this](const char* what, std::int32_t expected, std::int32_t found) {
     if (found >= expected) return;
-    throw IoError("cannot go on with the run in", folder_.string(),
-                  fmt::format("its journal counts {} segments of the {} store, and {} are there",
-                              expected, what, found),
-                  kStartOver);
+    refuse(fmt::format("its journal counts {} segments of the {} store, and {} are there", expected,
+                       what, found));
   };
+  std::int32_t lattice_segments = 0;
   for (const auto& [zoom, segments] : surveyed_) {
-    require("lattice", segments, count_lattice_segments(folder_));
+    lattice_segments = std::max(lattice_segments, segments);
   }
+  require("lattice", lattice_segments, count_lattice_segments(folder_));
   require("border", tiles_.border_segments, count_border_segments(folder_));
 }
 
@@ -188,8 +167,7 @@ std::optional<std::int32_t> RunRecord::coarsest_surveyed() const {
 SurveyedZoom RunRecord::surveyed(std::int32_t zoom, const TilingScheme& scheme) const {
   auto surveyed = read_survey_file(survey_file_path(folder_, zoom), zoom, scheme);
   if (surveyed) return std::move(surveyed.value());
-  throw IoError("cannot go on with the run in", folder_.string(), surveyed.error().message,
-                kStartOver);
+  refuse(surveyed.error().message);
 }
 
 void RunRecord::add_surveyed(std::int32_t zoom, const SurveyedZoom& surveyed) {
@@ -200,13 +178,12 @@ void RunRecord::add_surveyed(std::int32_t zoom, const SurveyedZoom& surveyed) {
 }
 
 void RunRecord::set_plan(const std::string& plan) {
-  const std::string text = json::parse(plan).dump();
+  const json parsed = json::parse(plan);
+  const std::string text = parsed.dump();
   if (plan_ && *plan_ != text) {
-    throw IoError("cannot go on with the run in", folder_.string(),
-                  "the survey finds other tiles or heights than before, so the input was changed",
-                  kStartOver);
+    refuse("the survey finds other tiles or heights than before, so the input was changed");
   }
-  if (!plan_) journal_->append(json{{"plan", json::parse(plan)}}.dump());
+  if (!plan_) journal_->append(json{{"plan", parsed}}.dump());
   plan_ = text;
 }
 

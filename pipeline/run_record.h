@@ -1,7 +1,7 @@
 // What a run has finished, kept beside the output so that another run can go on from there.
 //
-// The run folder holds a journal (formats/journal.h) and the stores' segments. The
-// journal's lines are JSON objects: first the run's fingerprint, then one for each zoom whose survey
+// The run folder holds a journal (formats/journal.h) and the stores' segments. The journal's lines
+// are JSON objects: first the run's fingerprint, then one for each zoom whose survey
 // is on disk, one for the plan of the mesh pass, and one for each checkpoint, which counts the tiles
 // that are safe: the first n of the schedule, whose order never changes. A folder that is kept when
 // all is done ends with a line that says so.
@@ -31,7 +31,8 @@ struct TileCheckpoint {
 
 class RunRecord {
  public:
-  // Goes on with the run that the folder tells of, or starts one; with kYes always starts one. Throws IoError, naming what differs, when the earlier run's fingerprint is another; when
+  // Goes on with the run that the folder tells of, or starts one; with kYes always starts one.
+  // Throws IoError, naming what differs, when the earlier run's fingerprint is another; when
   // something that the journal counts on is damaged or missing; when another run is at work there.
   static std::unique_ptr<RunRecord> open(const std::filesystem::path& folder,
                                          const std::string& fingerprint, Overwrite overwrite);
@@ -60,6 +61,8 @@ class RunRecord {
 
   // True when another run would go on from here instead of starting again.
   bool is_worth_keeping() const;
+  // Throws the IoError that says why this run cannot be gone on with.
+  [[noreturn]] void refuse(const std::string& cause) const;
   // The output is whole: removes the folder, or keeps it for whoever wants to look into it.
   void finish(bool keep);
 

@@ -5,8 +5,7 @@
 
 #include <system_error>
 
-#include "formats/errors.h"
-#include "formats/file_bytes.h"
+#include "formats/folders.h"
 
 namespace qmpipe {
 
@@ -15,12 +14,7 @@ namespace fs = std::filesystem;
 ScratchFolder::ScratchFolder(const fs::path& base) {
   const fs::path named = base.empty() ? fs::temp_directory_path() / "qmpipe-run" : base;
   path_ = fmt::format("{}-{}", named.string(), getpid());
-  std::error_code problem;
-  fs::create_directories(path_, problem);
-  if (problem) {
-    throw IoError("cannot make the run's folder", path_.string(), problem.message(),
-                  remedy_for_errno(problem.value()));
-  }
+  make_folders(path_);
 }
 
 ScratchFolder::~ScratchFolder() {

@@ -119,10 +119,7 @@ void Surveyor::sample(std::vector<BlockKey>& blocks) {
       progress_.advance(static_cast<std::int64_t>(kBlockSize));
       return;
     }
-    const PostWindow window = {.i0 = block.x * kBlockPosts,
-                               .j0 = block.y * kBlockPosts,
-                               .width_posts = kBlockPosts,
-                               .height_posts = kBlockPosts};
+    const PostWindow window = posts_of(block);
     std::vector<float> heights_m(kBlockSize);
     Sampler& sampler = *samplers.local();
     if (sampler.may_cover(lattice, window)) {
@@ -154,17 +151,11 @@ std::optional<float> Surveyor::settle_pole(const std::vector<BlockKey>& blocks,
   const std::int32_t zoom = lattice.zoom();
   std::vector<float> block_m(kBlockSize);
   const auto row = block_m.begin() + static_cast<std::ptrdiff_t>(j % kBlockPosts) * kBlockPosts;
-  const auto window_of = [](const BlockKey& block) {
-    return PostWindow{.i0 = block.x * kBlockPosts,
-                      .j0 = block.y * kBlockPosts,
-                      .width_posts = kBlockPosts,
-                      .height_posts = kBlockPosts};
-  };
   double sum_m = 0;
   std::int64_t count = 0;
   for (const BlockKey& block : blocks) {
     if (block.zoom != zoom || block.y != j / kBlockPosts) continue;
-    survey_.store->read(lattice, window_of(block), block_m);
+    survey_.store->read(lattice, posts_of(block), block_m);
     std::for_each(row, row + kBlockPosts, [&](float h) {
       if (std::isnan(h)) return;
       sum_m += static_cast<double>(h);
@@ -175,7 +166,7 @@ std::optional<float> Surveyor::settle_pole(const std::vector<BlockKey>& blocks,
   const auto height_m = static_cast<float>(sum_m / static_cast<double>(count));
   for (const BlockKey& block : blocks) {
     if (block.zoom != zoom || block.y != j / kBlockPosts) continue;
-    survey_.store->read(lattice, window_of(block), block_m);
+    survey_.store->read(lattice, posts_of(block), block_m);
     std::replace_if(
         row, row + kBlockPosts, [](float h) { return !std::isnan(h); }, height_m);
     survey_.store->put_block(zoom, block.x, block.y, block_m);

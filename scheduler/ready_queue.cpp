@@ -5,28 +5,28 @@
 #include "scheduler/check.h"
 
 namespace qmpipe {
-namespace {
-
-// How many of its sides wait for a tile from `first` on.
-std::int32_t waits_for(const PlannedTile& tile, TileIndex first) {
-  std::int32_t count = 0;
-  for (const Side side : kSides) {
-    if (tile.roles[index_of(side)] != SideRole::kHeir) continue;
-    if (tile.neighbours[index_of(side)] >= first) ++count;
-  }
-  return count;
-}
-
-}  // namespace
-
 ReadyQueue::ReadyQueue(const WavefrontPlan& plan, std::int32_t max_in_flight, TileIndex first)
     : plan_(plan), max_in_flight_(max_in_flight), next_to_retire_(first) {
   QMPIPE_CHECK(max_in_flight >= 1);
   QMPIPE_CHECK(first >= 0 && static_cast<std::size_t>(first) <= plan.tiles.size());
   in_degree_.reserve(plan.tiles.size());
-  for (const PlannedTile& tile : plan.tiles) in_degree_.push_back(waits_for(tile, first));
-  for (auto k = static_cast<std::size_t>(first); k < plan.tiles.size(); ++k) {
-    if (in_degree_[k] == 0) ready_.push(static_cast<TileIndex>(k));
+  for (const PlannedTile& tile : plan.tiles) {
+    const auto k = static_cast<TileIndex>(in_degree_.size());
+    in_degree_.push_back(tile.in_degree);
+    if (tile.in_degree == 0 && k >= first) ready_.push(k);
+  }
+  for (TileIndex done = 0; done < first; ++done) release_heirs(done);
+}
+
+void ReadyQueue::release_heirs(TileIndex tile) {
+  const PlannedTile& planned = plan_.tiles.at(static_cast<std::size_t>(tile));
+  for (const Side side : kSides) {
+    if (planned.roles[index_of(side)] != SideRole::kOwner) continue;
+    const TileIndex heir = planned.neighbours[index_of(side)];
+    std::int32_t& waits_for = in_degree_[static_cast<std::size_t>(heir)];
+    QMPIPE_CHECK(waits_for > 0);
+    // An earlier heir was done by an earlier run.
+    if (--waits_for == 0 && heir >= next_to_retire_) ready_.push(heir);
   }
 }
 
@@ -41,14 +41,7 @@ std::optional<TileIndex> ReadyQueue::pop() {
 
 void ReadyQueue::publish(TileIndex tile) {
   const std::scoped_lock lock(mutex_);
-  const PlannedTile& planned = plan_.tiles.at(static_cast<std::size_t>(tile));
-  for (const Side side : kSides) {
-    if (planned.roles[index_of(side)] != SideRole::kOwner) continue;
-    const TileIndex heir = planned.neighbours[index_of(side)];
-    std::int32_t& waits_for = in_degree_[static_cast<std::size_t>(heir)];
-    QMPIPE_CHECK(waits_for > 0);
-    if (--waits_for == 0) ready_.push(heir);
-  }
+  release_heirs(tile);
 }
 
 void ReadyQueue::retire(TileIndex tile) {

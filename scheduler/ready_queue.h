@@ -44,6 +44,9 @@ class ReadyQueue {
  private:
   using MinHeap = std::priority_queue<TileIndex, std::vector<TileIndex>, std::greater<>>;
 
+  // REQUIRES: mutex_ is held, or nobody else knows of the queue yet.
+  void release_heirs(TileIndex tile);
+
   const WavefrontPlan& plan_;
   const std::int32_t max_in_flight_;
   mutable std::mutex mutex_;

@@ -3,18 +3,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/mount.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <thread>
 
 #include "formats/errors.h"
+#include "tests/file_size_limit.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {
 namespace {
 
+using testing::FileSizeLimit;
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 using Bytes = std::vector<std::uint8_t>;
@@ -144,26 +144,6 @@ TEST(WriteFileAtomically, AnOlderFileStaysWholeUntilTheNewOneIs) {
     ASSERT_EQ(seen.find_first_not_of(seen[0]), std::string::npos);
   }
 }
-
-// Restores the limit on file sizes, and the signal that exceeding it raises.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &old_);
-    const rlimit limit = {.rlim_cur = bytes, .rlim_max = old_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &old_);
-    std::signal(SIGXFSZ, old_handler_);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  void (*old_handler_)(int);
-  rlimit old_{};
-};
 
 TEST(WriteFileAtomically, AWriteThatFailsHalfwayLeavesTheOldFileAndNoRest) {
   const TemporaryFolder folder;

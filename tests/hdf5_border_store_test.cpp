@@ -3,17 +3,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <csignal>
 #include <string>
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/hdf5_lattice_store.h"
+#include "tests/file_size_limit.h"
 #include "tests/program_output.h"
 #include "tests/random_borders.h"
 #include "tests/small_disk.h"
@@ -27,6 +26,7 @@ using testing::border_segment_path;
 using testing::BorderModel;
 using testing::bytes_of;
 using testing::expect_all;
+using testing::FileSizeLimit;
 using ::testing::HasSubstr;
 using testing::kBorderNumbers;
 using testing::make_segment;
@@ -196,26 +196,6 @@ TEST(Hdf5BorderStore, OnlyWhatWasSealedOutlivesACrash) {
   EXPECT_EQ(take(*store, 4), mask_of_seed(4));
   EXPECT_THROW(take(*store, 5), InternalError);
 }
-
-// Files of this process can have so many bytes as long as it lives.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &old_);
-    const rlimit limit = {.rlim_cur = bytes, .rlim_max = old_.rlim_max};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &old_);
-    std::signal(SIGXFSZ, old_handler_);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit old_ = {};
-  void (*old_handler_)(int);
-};
 
 std::string error_of_sealing(BorderStore& store) {
   try {

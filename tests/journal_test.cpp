@@ -3,18 +3,18 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <random>
 
 #include "formats/errors.h"
+#include "tests/file_size_limit.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {
 namespace {
 
 using ::testing::ElementsAre;
+using testing::FileSizeLimit;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::TemporaryFolder;
@@ -122,20 +122,13 @@ TEST(Journal, AnAppendThatDoesNotFitLeavesWhatWasThere) {
   const TemporaryFolder folder;
   const auto journal = open_sound(folder);
   journal->append("one");
-  const auto was = std::signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  rlimit tight = before;
-  tight.rlim_cur = 100;
-  setrlimit(RLIMIT_FSIZE, &tight);
   std::string said;
   try {
+    const FileSizeLimit limit(100);
     journal->append(std::string(500, 'x'));
   } catch (const IoError& error) {
     said = error.what();
   }
-  setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, was);
   EXPECT_THAT(said, HasSubstr("cannot write the journal"));
   journal->append("two");
   EXPECT_EQ(folder.get("journal"), written({"one", "two"}));
