@@ -119,7 +119,8 @@ BuildReport run_mesh_pass(const BuildOptions& options, const BuildPlan& plan,
     throw Interrupted(
         fmt::format("stopped after {} of {} tiles", result.tiles_done, plan.tile_count()));
   }
-  checkpointer.reset();
+  // What comes now may be interrupted too.
+  if (checkpointer) checkpointer->write_now(report);
   QMPIPE_CHECK(borders->size() == 0);
   if (const auto missing = missing_tile(sink, plan, plan.tile_count())) {
     throw IoError("cannot finish", options.output.path.string(),

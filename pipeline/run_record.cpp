@@ -28,15 +28,18 @@ void make_run_folder(const fs::path& folder) {
   sync_folder_of(plain_path(folder));
 }
 
-// Whatever else stands in a folder that the user has named is the user's. The journal goes first: a
-// crash in between leaves a folder that claims nothing.
-void remove_own_files(const fs::path& folder) {
-  if (!fs::exists(folder)) return;
-  remove_file(folder / kJournalName);
+void remove_stores(const fs::path& folder) {
   for (const SegmentKind kind : {SegmentKind::kLattice, SegmentKind::kBorders}) {
     remove_segments(folder, kind);
   }
   remove_survey_files(folder);
+}
+
+// Whatever else stands in a folder that the user has named is the user's.
+void remove_own_files(const fs::path& folder) {
+  if (!fs::exists(folder)) return;
+  remove_stores(folder);
+  remove_file(folder / kJournalName);
   remove_folder_if_empty(folder);
 }
 
@@ -88,11 +91,17 @@ std::unique_ptr<RunRecord> RunRecord::open(const fs::path& folder, const std::st
     static_cast<void>(Journal::open(folder / kJournalName));
   }
   // Without a journal it is the rest of a run that was done and could not clear up.
-  if (!has_journal || overwrite == Overwrite::kYes) remove_own_files(folder);
+  if (!has_journal || overwrite == Overwrite::kYes) {
+    // Before what it counts on.
+    remove_file(folder / kJournalName);
+    remove_own_files(folder);
+  }
   std::unique_ptr<RunRecord> record(new RunRecord(folder, open_journal(folder)));
   // Whatever is wrong with an earlier run's folder, it is the user's to remove.
   record->is_kept_ = !record->journal_->lines().empty();
   record->read_lines(fingerprint);
+  // The run that began with it was killed.
+  if (record->is_clearing_) remove_stores(folder);
   record->check_stores();
   record->is_kept_ = false;
   return record;
@@ -111,9 +120,7 @@ void RunRecord::read_lines(const std::string& fingerprint) {
     if (read_line(lines[k])) continue;
     refuse(fmt::format("line {} of its journal says nothing that this version knows", k + 1));
   }
-  if (is_finished_) {
-    refuse("it is finished");
-  }
+  if (is_finished_) refuse("it is finished");
   const auto differences = fingerprint_differences(lines.front(), fingerprint);
   if (differences.empty()) return;
   throw IoError("cannot go on with the unfinished run in", folder_.string(), listed(differences),
@@ -123,11 +130,16 @@ void RunRecord::read_lines(const std::string& fingerprint) {
 
 bool RunRecord::read_line(const std::string& line) try {
   const json object = json::parse(line);
+  is_clearing_ = false;
   if (object.contains("surveyed_zoom")) {
     surveyed_[object.at("surveyed_zoom").get<std::int32_t>()] =
         object.at("lattice_segments").get<std::int32_t>();
   } else if (object.contains("plan")) {
     plan_ = object.at("plan").dump();
+  } else if (object.contains("stores_removed")) {
+    surveyed_.clear();
+    tiles_.border_segments = 0;
+    is_clearing_ = true;
   } else if (object.contains("finished")) {
     is_finished_ = true;
   } else {
@@ -201,6 +213,8 @@ void RunRecord::finish(bool keep) {
     journal_->append(json{{"finished", true}}.dump());
     return;
   }
+  // First of all: a crash must not leave a journal that counts on what is gone.
+  journal_->append(json{{"stores_removed", true}}.dump());
   remove_own_files(folder_);
 }
 

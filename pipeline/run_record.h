@@ -3,8 +3,9 @@
 // The run folder holds a journal (formats/journal.h) and the stores' segments. The journal's lines
 // are JSON objects: first the run's fingerprint, then one for each zoom whose survey
 // is on disk, one for the plan of the mesh pass, and one for each checkpoint, which counts the tiles
-// that are safe: the first n of the schedule, whose order never changes. A folder that is kept when
-// all is done ends with a line that says so.
+// that are safe: the first n of the schedule, whose order never changes. When all is done, a line says
+// that the folder is kept, or that its stores no longer count because they are being removed: a run
+// that is killed meanwhile surveys again, and finds all tiles done.
 // Guarantees: nothing is counted before it is on disk. What a crash cut off is done again. Of the
 // folder, only files of a run are ever removed.
 // Used by one thread at a time.
@@ -80,6 +81,7 @@ class RunRecord {
   std::map<std::int32_t, std::int32_t> surveyed_;
   std::optional<std::string> plan_;
   bool is_finished_ = false;
+  bool is_clearing_ = false;  // says the last line
   TileCheckpoint tiles_;
 };
 

@@ -95,6 +95,15 @@ class ResumeTest(unittest.TestCase):
             time.sleep(0.005)
         return False
 
+    @staticmethod
+    def was_done(out):
+        """Killed when there was nothing left to do but to end."""
+        if not (out / "layer.json").exists() or (run_folder(out) / "journal").exists():
+            return False
+        if run_folder(out).exists():
+            run_folder(out).rmdir()
+        return True
+
     def expect_same(self, out):
         found = contents(out)
         self.assertEqual(sorted(found), sorted(self.expected))
@@ -164,6 +173,8 @@ class KilledRuns(ResumeTest):
             return None
         process.kill()
         process.wait(timeout=60)
+        if self.was_done(out):
+            return None
         if where == "survey" and next(out.glob("*/*/*.terrain"), None):
             where = "mesh"
         return where
@@ -214,6 +225,25 @@ class KilledRuns(ResumeTest):
         self.assertGreater(fills, 3)
         self.expect_same(out)
         print("the disk was full", fills, "times", flush=True)
+
+
+    def test_killed_while_it_clears_up_goes_on(self):
+        dice = random.Random(SEED + 2)
+        in_clearing = 0
+        for k in range(8):
+            out = self.unfinished(f"clearing-{k}")
+            process = self.start(out, "--memory", LITTLE_MEMORY)
+            while process.poll() is None and not (out / "layer.json").exists():
+                time.sleep(0.0005)
+            time.sleep(dice.uniform(0, 0.01))
+            process.kill()
+            process.wait(timeout=60)
+            if self.was_done(out):
+                self.expect_same(out)
+                continue
+            in_clearing += 1
+            self.finish(out, "--memory", LITTLE_MEMORY)
+        print("killed while it cleared up", in_clearing, "times", flush=True)
 
 
 class StoppedRuns(ResumeTest):

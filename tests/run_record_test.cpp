@@ -83,6 +83,24 @@ TEST(RunFolder, StandsBesideTheOutputHoweverThatIsWritten) {
   EXPECT_EQ(run_folder_of("/data/tiles"), "/data/tiles.qmpipe-run");
 }
 
+TEST_F(RunRecordTest, KilledWhileItClearsUpItKeepsItsTilesAndSurveysAgain) {
+  open()->add_surveyed(4, {});
+  open()->add_tiles({.tiles_done = 9, .border_segments = 0, .report_state = "{}"});
+  folder_.put("out.qmpipe-run/lattice-000001.h5", "the segment before it is gone already");
+  (*Journal::open(folder_.path() / "out.qmpipe-run" / "journal"))
+      ->append(R"({"stores_removed":true})");
+  {
+    const auto record = open();
+    EXPECT_TRUE(record->resumes());
+    EXPECT_EQ(record->tiles().tiles_done, 9);
+    EXPECT_FALSE(record->is_surveyed(4));
+    EXPECT_FALSE(folder_.has("out.qmpipe-run/lattice-000001.h5"));
+    EXPECT_FALSE(folder_.has("out.qmpipe-run/survey-04.qms"));
+    record->add_surveyed(5, {});
+  }
+  EXPECT_TRUE(open()->is_surveyed(5)) << "what comes after that line counts again";
+}
+
 TEST_F(RunRecordTest, WhatElseStandsInTheFolderStays) {
   folder_.put("out.qmpipe-run/notes.txt", "mine");
   folder_.put("out.qmpipe-run/data/lattice-000000.h5", "mine too");
