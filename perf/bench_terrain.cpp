@@ -185,7 +185,7 @@ GreedyOptions options_for(const BenchTile& tile, double tolerance_m) {
 GreedyOptions options_for_vertices(const BenchTile& tile, std::size_t vertices) {
   const auto count = [&tile](double tolerance_m) {
     return greedy_insertion(tile.grid, tile.heights_m, {}, options_for(tile, tolerance_m))
-        .posts.size();
+        .vertices.size();
   };
   double coarse_m = 2000;
   while (count(coarse_m / 2) < vertices) coarse_m /= 2;

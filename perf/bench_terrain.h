@@ -52,7 +52,7 @@ struct BenchTile {
   std::string name;
   TilingScheme scheme{Projection::kGeodetic};
   TileKey key;
-  TileGrid grid;
+  PostGrid grid;
   WindowHeights window;          // with a halo of one post
   std::vector<float> heights_m;  // the tile's own posts
 };

@@ -34,8 +34,9 @@ std::shared_ptr<const Steps> steps_of(const BenchTile& tile, std::size_t vertice
   steps->height_step_m = options.height_step_m;
   steps->inserted = greedy_insertion(tile.grid, tile.heights_m, {}, options);
   steps->ordered = strip_ordered(steps->inserted);
-  steps->mesh = quantize(tile.grid, steps->ordered, tile.heights_m, options.height_step_m);
-  steps->mesh.normals = tile_normals(tile.scheme, tile.key, tile.window, steps->ordered.posts);
+  steps->mesh = quantize(tile.grid, steps->ordered, options.height_step_m);
+  steps->mesh.normals =
+      tile_normals(tile.scheme, tile.key, tile.grid, tile.window, steps->ordered.vertices);
   steps->bytes = encode(steps->mesh);
   return steps;
 }
@@ -63,13 +64,13 @@ void register_tile(const std::string& name, const std::shared_ptr<const Steps>& 
     return std::size_t{0};
   });
   register_step("quantize/" + name, steps, [](const Steps& s) {
-    benchmark::DoNotOptimize(
-        quantize(s.tile.grid, s.ordered, s.tile.heights_m, s.height_step_m).h.data());
+    benchmark::DoNotOptimize(quantize(s.tile.grid, s.ordered, s.height_step_m).h.data());
     return std::size_t{0};
   });
   register_step("normals/" + name, steps, [](const Steps& s) {
     benchmark::DoNotOptimize(
-        tile_normals(s.tile.scheme, s.tile.key, s.tile.window, s.ordered.posts).data());
+        tile_normals(s.tile.scheme, s.tile.key, s.tile.grid, s.tile.window, s.ordered.vertices)
+            .data());
     return std::size_t{0};
   });
   register_step("encode/" + name, steps, [](const Steps& s) { return encode(s.mesh).size(); });

@@ -21,7 +21,7 @@ void insert(benchmark::State& state, const BenchTile& tile, const GreedyOptions&
   std::size_t vertices = 0;
   for (auto _ : state) {
     const Tin tin = greedy_insertion(tile.grid, tile.heights_m, {}, options);
-    vertices = tin.posts.size();
+    vertices = tin.vertices.size();
     benchmark::DoNotOptimize(tin.indices.data());
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(vertices));

@@ -129,7 +129,7 @@ std::vector<Vec3> points_of_tile(const RectangleDeg& rectangle, const QuantizedM
   return points;
 }
 
-std::vector<Vec3> points_of_lattice(const TileGrid& grid, std::span<const float> heights_m,
+std::vector<Vec3> points_of_lattice(const PostGrid& grid, std::span<const float> heights_m,
                                     Random& random) {
   std::vector<Vec3> points;
   points.reserve(kTilePostCount + kRandomPointsOnFaces + kRandomPointsOnEdges);

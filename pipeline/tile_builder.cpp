@@ -19,7 +19,7 @@ std::uint64_t hash_of(const TileKey& key, std::span<const std::uint8_t> bytes) {
   return hash;
 }
 
-BorderMask meridian_border(const TileGrid& grid, std::span<const float> heights_m,
+BorderMask meridian_border(const PostGrid& grid, std::span<const float> heights_m,
                            double tolerance_m, double step_m) {
   std::array<float, kTilePosts> line_m{};
   for (std::int32_t k = 0; k < kTilePosts; ++k) {
@@ -33,7 +33,7 @@ BorderMask meridian_border(const TileGrid& grid, std::span<const float> heights_
 
 void TileBuilder::read_window(TileWork& work) const {
   const StageClock clock(work, Stage::kWindow);
-  work.grid = std::make_unique<TileGrid>(make_tile_grid(heightfield_.scheme(), work.key));
+  work.grid = std::make_unique<PostGrid>(make_tile_grid(heightfield_.scheme(), work.key));
   work.window = heightfield_.window(work.key.zoom, Lattice::tile_window(work.key, 1));
   work.heights_m.resize(kTilePostCount);
   work.valid.resize(kTilePostCount);
@@ -65,9 +65,10 @@ void TileBuilder::simplify(TileWork& work, FixedBorders fixed, const PlannedTile
 void TileBuilder::finish(TileWork& work) const {
   const StageClock clock(work, Stage::kFinish);
   const double step_m = recipe_.height_step_m[static_cast<std::size_t>(work.key.zoom)];
-  work.mesh = quantize(*work.grid, work.tin, work.heights_m, step_m);
+  work.mesh = quantize(*work.grid, work.tin, step_m);
   if (recipe_.normals) {
-    work.mesh.normals = tile_normals(heightfield_.scheme(), work.key, work.window, work.tin.posts);
+    work.mesh.normals =
+        tile_normals(heightfield_.scheme(), work.key, *work.grid, work.window, work.tin.vertices);
   }
   work.error = measure_error(*work.grid, work.mesh, work.heights_m, work.valid);
   work.vertices = work.mesh.vertex_count();

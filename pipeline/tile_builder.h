@@ -29,7 +29,7 @@ using StageSeconds = std::array<double, kStageCount>;
 struct TileWork {
   TileIndex index = kNoTile;
   TileKey key;
-  std::unique_ptr<TileGrid> grid;
+  std::unique_ptr<PostGrid> grid;
   WindowHeights window;          // with a halo of one post
   std::vector<float> heights_m;  // the tile's own 257 x 257 posts
   std::vector<std::uint8_t> valid;

@@ -219,7 +219,7 @@ void Verification::measure(const QuantizedMesh& mesh, TileOutcome& outcome) cons
                                         "were not compared with the source"});
     return;
   }
-  const TileGrid grid = make_tile_grid(layer_.scheme, outcome.key);
+  const PostGrid grid = make_tile_grid(layer_.scheme, outcome.key);
   outcome.error = measure_error(grid, mesh, posts->heights_m, posts->valid);
   judge_error(outcome);
   const bool has_voids = std::count(posts->valid.begin(), posts->valid.end(), 0) > 0;
@@ -232,7 +232,7 @@ void Verification::judge_error(TileOutcome& outcome) const {
   const std::optional<double> tolerance_m = source_->tolerance_m(outcome.key.zoom);
   const ErrorSummary& error = outcome.error;
   if (!tolerance_m || error.largest_m <= *tolerance_m) return;
-  const TileGrid grid = make_tile_grid(layer_.scheme, outcome.key);
+  const PostGrid grid = make_tile_grid(layer_.scheme, outcome.key);
   outcome.findings.push_back(
       {.kind = FindingKind::kTolerance,
        .key = outcome.key,

@@ -16,24 +16,27 @@ double cos_squared_deg(double latitude_deg) {
 }
 }  // namespace
 
-CurvatureTerms curvature_terms(const TileGrid& grid) {
+CurvatureTerms curvature_terms(const PostGrid& grid) {
   CurvatureTerms terms;
   terms.metres_per_unit = -kEquatorialRadiusM / 2;
   terms.width_rad = (grid.longitude_deg.back() - grid.longitude_deg.front()) * kRadPerDeg;
   terms.height_rad = (grid.latitude_deg.back() - grid.latitude_deg.front()) * kRadPerDeg;
   const double middle_lon_deg = (grid.longitude_deg.front() + grid.longitude_deg.back()) / 2;
   const double middle_lat_deg = (grid.latitude_deg.front() + grid.latitude_deg.back()) / 2;
-  for (std::size_t k = 0; k < terms.longitude_squared.size(); ++k) {
-    const double dl = (grid.longitude_deg[k] - middle_lon_deg) * kRadPerDeg;
-    const double df = (grid.latitude_deg[k] - middle_lat_deg) * kRadPerDeg;
-    terms.longitude_squared[k] = dl * dl;
-    terms.latitude_squared[k] = df * df;
-    terms.parallel_scale[k] = cos_squared_deg(grid.latitude_deg[k]);
+  for (const double longitude_deg : grid.longitude_deg) {
+    const double dl = (longitude_deg - middle_lon_deg) * kRadPerDeg;
+    terms.longitude_squared.push_back(dl * dl);
+  }
+  for (const double latitude_deg : grid.latitude_deg) {
+    const double df = (latitude_deg - middle_lat_deg) * kRadPerDeg;
+    terms.latitude_squared.push_back(df * df);
+    terms.parallel_scale.push_back(cos_squared_deg(latitude_deg));
   }
   return terms;
 }
 
-double largest_sagitta_m(const TileGrid& grid) {
+double largest_sagitta_m(const PostGrid& grid) {
+  if (!grid.on_globe()) return 0;
   const double width_rad = (grid.longitude_deg.back() - grid.longitude_deg.front()) * kRadPerDeg;
   const double height_rad = (grid.latitude_deg.back() - grid.latitude_deg.front()) * kRadPerDeg;
   const bool spans_equator = grid.latitude_deg.front() <= 0 && grid.latitude_deg.back() >= 0;

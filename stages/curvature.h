@@ -9,19 +9,19 @@
 // 2020, section 4.4.4 puts a regular grid there instead).
 #pragma once
 
-#include <array>
+#include <vector>
 
 #include "formats/quantized_mesh.h"
-#include "stages/tin.h"
+#include "stages/post_grid.h"
 
 namespace qmpipe {
 
 // Squares of angles in radians from the tile's centre, by column and row of posts.
 struct CurvatureTerms {
-  std::array<double, kTilePosts> longitude_squared{};
-  std::array<double, kTilePosts> latitude_squared{};
-  std::array<double, kTilePosts> parallel_scale{};  // cos^2 of the row's latitude
-  double metres_per_unit = 0;                       // -R/2
+  std::vector<double> longitude_squared;
+  std::vector<double> latitude_squared;
+  std::vector<double> parallel_scale;  // cos^2 of the row's latitude
+  double metres_per_unit = 0;          // -R/2
   double width_rad = 0;
   double height_rad = 0;
 
@@ -43,9 +43,11 @@ struct CurvatureTerms {
   }
 };
 
-CurvatureTerms curvature_terms(const TileGrid& grid);
+// REQUIRES: the grid of a tile.
+CurvatureTerms curvature_terms(const PostGrid& grid);
 
 // The depth of the tile's longest chord in metres: an upper bound for any triangle in it.
-double largest_sagitta_m(const TileGrid& grid);
+// 0 on a plane.
+double largest_sagitta_m(const PostGrid& grid);
 
 }  // namespace qmpipe

@@ -16,13 +16,13 @@ bool in_circle(const IntPoint& a, const IntPoint& b, const IntPoint& c, const In
          0;
 }
 
-Delaunay::Delaunay(std::int32_t size, std::size_t expected_vertices) {
-  QMPIPE_CHECK(size >= 1 && size <= 32767);
+Delaunay::Delaunay(const IntPoint& size, std::size_t expected_vertices) {
+  QMPIPE_CHECK(size.x >= 1 && size.x <= 32767 && size.y >= 1 && size.y <= 32767);
   points_.reserve(expected_vertices);
   origin_.reserve(6 * expected_vertices);
   twin_.reserve(6 * expected_vertices);
   stamp_.reserve(2 * expected_vertices);
-  points_ = {{0, 0}, {size, 0}, {size, size}, {0, size}};
+  points_ = {{0, 0}, {size.x, 0}, size, {0, size.y}};
   const Index lower = add_triangle(0, 1, 2);
   const Index upper = add_triangle(0, 2, 3);
   link(3 * lower + 2, 3 * upper);

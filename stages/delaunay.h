@@ -1,12 +1,12 @@
-// Incremental Delaunay triangulation of a square, exact in integer arithmetic.
+// Incremental Delaunay triangulation of a rectangle, exact in integer arithmetic.
 //
 // Notation: triangle t has half-edges 3t, 3t+1, 3t+2; half-edge e runs from origin(e) to the origin
 // of the next one, counter-clockwise, and twin(e) runs the other way in the neighbour (-1 on the
 // hull). Points are integers in 0..32767, so orientation fits 32 bits and the in-circle determinant
-// 64: each of its three terms is at most 2^30 (twice a triangle's area inside the square) times
+// 64: each of its three terms is at most 2^30 (twice a triangle's area inside the rectangle) times
 // 2^31 (a squared distance), and 3 * 2^61 < 2^63.
 //
-// Guarantees: after every insertion the triangles cover the square exactly once, all
+// Guarantees: after every insertion the triangles cover the rectangle exactly once, all
 // counter-clockwise with positive area, and no vertex lies strictly inside a circumcircle. The
 // result depends on the points and the order of insertion alone.
 // Source: Guibas and Stolfi 1985; Lawson's flips as in Garland and Heckbert 1995, section 4.
@@ -38,11 +38,11 @@ class Delaunay {
   using Index = std::int32_t;
   static constexpr Index kNone = -1;
 
-  // The square 0..size with its corners as vertices 0 (south-west), 1 (south-east), 2 (north-east),
-  // 3 (north-west) and two triangles. REQUIRES: 1 <= size <= 32767.
-  explicit Delaunay(std::int32_t size, std::size_t expected_vertices = 1024);
+  // The rectangle from (0, 0) to `size` with its corners as vertices 0 (south-west), 1 (south-east),
+  // 2 (north-east), 3 (north-west) and two triangles. REQUIRES: 1 <= size.x, size.y <= 32767.
+  explicit Delaunay(const IntPoint& size, std::size_t expected_vertices = 1024);
 
-  // Adds a point of the square and returns its vertex. `near` is a triangle to start the search
+  // Adds a point of the rectangle and returns its vertex. `near` is a triangle to start the search
   // from. A point that is a vertex already is not added again; its vertex is returned and
   // touched() is empty.
   Index insert(const IntPoint& point, Index near);

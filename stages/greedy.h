@@ -1,7 +1,7 @@
 // Greedy insertion: the coarsest TIN first, then always the worst post (Garland and Heckbert 1995;
 // Campos et al. 2020, sections 4.1 and 4.4.4).
 //
-// Guarantees: the TIN covers the tile's square; its corners are vertices; on a fixed side exactly
+// Guarantees: the TIN covers the grid's rectangle; its corners are vertices; on a fixed side exactly
 // the given posts are vertices; every post that is not a vertex is within `tolerance_m` of the
 // surface that the file will decode to (vertex heights snapped to `height_step_m`, corners of
 // triangles at their quantized places, posts at their exact ones). With `Curvature::kCounts` the
@@ -10,18 +10,14 @@
 // Ties are broken by the post's index. Pure: same input, same bits.
 #pragma once
 
-#include <array>
-#include <optional>
+#include <cstdint>
+#include <limits>
 #include <span>
 
+#include "stages/post_errors.h"
 #include "stages/tin.h"
 
 namespace qmpipe {
-
-// By index_of(Side): the vertices that a side must have, or none where this tile decides.
-using FixedBorders = std::array<std::optional<BorderMask>, 4>;
-
-enum class Curvature { kCounts, kIgnored };
 
 struct GreedyOptions {
   // The zoom's tolerance g(z), the paper's g_e. REQUIRES: > height_step_m / 2.
@@ -31,10 +27,12 @@ struct GreedyOptions {
   // The paper's g_g: a regular grid of this many cells a side is inserted first; 0 for none.
   std::int32_t initial_grid_cells = 0;
   Curvature curvature = Curvature::kCounts;
+  // Stops here, or one triangle later, whatever the tolerance says.
+  std::int32_t most_triangles = std::numeric_limits<std::int32_t>::max();
 };
 
-// REQUIRES: heights_m has kTilePostCount finite heights, row by row from the south.
-Tin greedy_insertion(const TileGrid& grid, std::span<const float> heights_m,
+// REQUIRES: grid.post_count() finite heights; fixed borders only for a tile's 257 x 257 posts.
+Tin greedy_insertion(const PostGrid& grid, std::span<const float> heights_m,
                      const FixedBorders& fixed, const GreedyOptions& options);
 
 }  // namespace qmpipe

@@ -1,5 +1,6 @@
 #include "stages/normals.h"
 
+#include <algorithm>
 #include <array>
 
 #include "formats/oct_normal.h"
@@ -62,6 +63,19 @@ Vec3 normal_at(const Lattice& lattice, const WindowHeights& heights, const PostF
                     minus(at(post.i, north), at(post.i, south))));
 }
 
+// Between which two columns or rows a place lies, and how far on the way.
+struct Cell {
+  std::int32_t first = 0;
+  double part = 0;
+};
+
+Cell cell_of(const std::vector<double>& places, std::int32_t at) {
+  const auto above = std::upper_bound(places.begin() + 1, places.end() - 1, at);
+  const double low = *(above - 1);
+  return {.first = static_cast<std::int32_t>(above - places.begin()) - 1,
+          .part = std::clamp((at - low) / (*above - low), 0.0, 1.0)};
+}
+
 }  // namespace
 
 Vec3 lattice_normal(const Lattice& lattice, const WindowHeights& heights, const Post& post) {
@@ -69,17 +83,31 @@ Vec3 lattice_normal(const Lattice& lattice, const WindowHeights& heights, const 
 }
 
 std::vector<OctNormal> tile_normals(const TilingScheme& scheme, const TileKey& key,
-                                    const WindowHeights& heights,
-                                    std::span<const std::int32_t> posts) {
+                                    const PostGrid& grid, const WindowHeights& heights,
+                                    std::span<const TinVertex> vertices) {
   QMPIPE_CHECK(heights.window == Lattice::tile_window(key, 1));
   const Lattice lattice(scheme, key.zoom);
   const PostFrame frame(lattice, heights.window);
+  const auto normal_of = [&](std::int32_t i, std::int32_t j) {
+    return normal_at(lattice, heights, frame,
+                     {.i = key.x * kTileIntervals + i, .j = key.y * kTileIntervals + j});
+  };
   std::vector<OctNormal> normals;
-  normals.reserve(posts.size());
-  for (const std::int32_t post : posts) {
-    const Post on_lattice = {.i = key.x * kTileIntervals + post % kTilePosts,
-                             .j = key.y * kTileIntervals + post / kTilePosts};
-    normals.push_back(encode_oct_normal(normal_at(lattice, heights, frame, on_lattice)));
+  normals.reserve(vertices.size());
+  for (const TinVertex& vertex : vertices) {
+    if (vertex.post != kNoPost) {
+      normals.push_back(
+          encode_oct_normal(normal_of(grid.column(vertex.post), grid.row(vertex.post))));
+      continue;
+    }
+    const Cell east = cell_of(grid.u_exact, vertex.u);
+    const Cell north = cell_of(grid.v_exact, vertex.v);
+    const auto row = [&](std::int32_t j) {
+      return plus(scaled(normal_of(east.first, j), 1 - east.part),
+                  scaled(normal_of(east.first + 1, j), east.part));
+    };
+    normals.push_back(encode_oct_normal(unit(
+        plus(scaled(row(north.first), 1 - north.part), scaled(row(north.first + 1), north.part)))));
   }
   return normals;
 }

@@ -16,9 +16,10 @@ namespace qmpipe {
 // REQUIRES: the window holds the post's neighbours as far as the lattice has them.
 Vec3 lattice_normal(const Lattice& lattice, const WindowHeights& heights, const Post& post);
 
-// One for each of the tile's posts given by tile_post_index. REQUIRES: a halo of one post.
+// One for each of the tile's vertices; for one between posts, the mean of the normals of the four
+// around it, weighted by how near they are. REQUIRES: a halo of one post.
 std::vector<OctNormal> tile_normals(const TilingScheme& scheme, const TileKey& key,
-                                    const WindowHeights& heights,
-                                    std::span<const std::int32_t> posts);
+                                    const PostGrid& grid, const WindowHeights& heights,
+                                    std::span<const TinVertex> vertices);
 
 }  // namespace qmpipe

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "scheduler/check.h"
 #include "stages/geodesy.h"
@@ -39,7 +40,7 @@ void list_sides(QuantizedMesh& mesh) {
   }
 }
 
-void fill_globe_fields(const TileGrid& grid, QuantizedMesh& mesh) {
+void fill_globe_fields(const PostGrid& grid, QuantizedMesh& mesh) {
   const RectangleDeg rectangle = {.west_deg = grid.longitude_deg.front(),
                                   .south_deg = grid.latitude_deg.front(),
                                   .east_deg = grid.longitude_deg.back(),
@@ -80,21 +81,17 @@ Vec3 decoded_position_ecef(const QuantizedMesh& mesh, const RectangleDeg& rectan
                   .height_m = decoded_height_m(mesh, vertex)});
 }
 
-QuantizedMesh quantize(const TileGrid& grid, const Tin& tin, std::span<const float> heights_m,
-                       double height_step_m) {
-  QMPIPE_CHECK(heights_m.size() == kTilePostCount && tin.posts.size() >= 4);
+QuantizedMesh quantize(const PostGrid& grid, const Tin& tin, double height_step_m) {
+  QMPIPE_CHECK(grid.on_globe() && tin.vertices.size() >= 4);
   QuantizedMesh mesh;
   std::vector<std::int64_t> steps;
-  steps.reserve(tin.posts.size());
-  mesh.u.reserve(tin.posts.size());
-  mesh.v.reserve(tin.posts.size());
-  for (const std::int32_t post : tin.posts) {
-    const double height_m = static_cast<double>(heights_m[static_cast<std::size_t>(post)]);
-    steps.push_back(std::llround(height_m / height_step_m));
-    mesh.u.push_back(
-        static_cast<std::uint16_t>(grid.u[static_cast<std::size_t>(post % kTilePosts)]));
-    mesh.v.push_back(
-        static_cast<std::uint16_t>(grid.v[static_cast<std::size_t>(post / kTilePosts)]));
+  steps.reserve(tin.vertices.size());
+  mesh.u.reserve(tin.vertices.size());
+  mesh.v.reserve(tin.vertices.size());
+  for (const TinVertex& vertex : tin.vertices) {
+    steps.push_back(std::llround(vertex.height_m / height_step_m));
+    mesh.u.push_back(static_cast<std::uint16_t>(vertex.u));
+    mesh.v.push_back(static_cast<std::uint16_t>(vertex.v));
   }
   quantize_heights(steps, height_step_m, mesh);
   mesh.indices = tin.indices;

@@ -6,18 +6,15 @@
 // in its last place: under 0.5 mm below 8 km.
 #pragma once
 
-#include <span>
-
 #include "formats/quantized_mesh.h"
 #include "stages/tin.h"
 
 namespace qmpipe {
 
 // Header, vertices, triangles and side lists; normals are left empty. Vertices keep the TIN's order.
-// REQUIRES: the TIN is strip_ordered(); heights_m has kTilePostCount heights of the tile's posts;
-// their range fits 32767 steps.
-QuantizedMesh quantize(const TileGrid& grid, const Tin& tin, std::span<const float> heights_m,
-                       double height_step_m);
+// REQUIRES: the TIN of a tile, strip_ordered(); its heights are multiples of the step, and their
+// range fits 32767 of them.
+QuantizedMesh quantize(const PostGrid& grid, const Tin& tin, double height_step_m);
 
 // The height of a vertex as a client decodes it.
 double decoded_height_m(const QuantizedMesh& mesh, std::size_t vertex);

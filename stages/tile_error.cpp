@@ -19,7 +19,7 @@ IntPoint corner(const QuantizedMesh& mesh, std::uint32_t vertex) {
   return {mesh.u[vertex], mesh.v[vertex]};
 }
 
-std::vector<double> surface_at_posts(const TileGrid& grid, const QuantizedMesh& mesh) {
+std::vector<double> surface_at_posts(const PostGrid& grid, const QuantizedMesh& mesh) {
   std::vector<double> surface(kTilePostCount, std::numeric_limits<double>::quiet_NaN());
   for (std::size_t t = 0; t + 2 < mesh.indices.size(); t += 3) {
     const IntPoint a = corner(mesh, mesh.indices[t]);
@@ -48,7 +48,7 @@ std::vector<double> surface_at_posts(const TileGrid& grid, const QuantizedMesh& 
   return surface;
 }
 
-void place_vertices(const TileGrid& grid, const QuantizedMesh& mesh, std::vector<double>& surface) {
+void place_vertices(const PostGrid& grid, const QuantizedMesh& mesh, std::vector<double>& surface) {
   for (std::size_t k = 0; k < mesh.vertex_count(); ++k) {
     const auto column = std::lower_bound(grid.u.begin(), grid.u.end(), mesh.u[k]);
     const auto row = std::lower_bound(grid.v.begin(), grid.v.end(), mesh.v[k]);
@@ -77,7 +77,7 @@ double ErrorSummary::rms_m() const {
   return posts == 0 ? 0 : std::sqrt(sum_of_squares_m2 / static_cast<double>(posts));
 }
 
-ErrorSummary measure_error(const TileGrid& grid, const QuantizedMesh& mesh,
+ErrorSummary measure_error(const PostGrid& grid, const QuantizedMesh& mesh,
                            std::span<const float> heights_m, std::span<const std::uint8_t> valid) {
   QMPIPE_CHECK(heights_m.size() == kTilePostCount && valid.size() == kTilePostCount);
   std::vector<double> surface = surface_at_posts(grid, mesh);

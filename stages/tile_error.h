@@ -25,7 +25,7 @@ struct ErrorSummary {
 
 // REQUIRES: a mesh that decoded; heights_m and valid of kTilePostCount. Posts that no triangle
 // covers (a damaged tile of another program) are not counted.
-ErrorSummary measure_error(const TileGrid& grid, const QuantizedMesh& mesh,
+ErrorSummary measure_error(const PostGrid& grid, const QuantizedMesh& mesh,
                            std::span<const float> heights_m, std::span<const std::uint8_t> valid);
 
 }  // namespace qmpipe

@@ -1,52 +1,46 @@
-// The surface of one tile between simplification and quantization: a TIN over lattice posts.
-//
-// Frames: post (i, j) of a tile has 0 <= i, j <= 256, i to the east, j to the north. (u, v) is the
-// quantized frame of the file, 0..32767. TileGrid maps one to the other; the simplifiers
-// triangulate in (u, v), because that is the plane in which a client interpolates heights: in the
-// mercator scheme v is linear in latitude, not in j (FORMATS 2.7).
+// The surface of one tile (or one DEM) between simplification and quantization.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "scheduler/border.h"
-#include "scheduler/lattice.h"
+#include "stages/post_grid.h"
 
 namespace qmpipe {
 
-// Where the columns and rows of a tile's posts lie in the quantized frame.
-struct TileGrid {
-  // Rounded, as a vertex is stored.
-  std::array<std::int32_t, kTilePosts> u{};
-  std::array<std::int32_t, kTilePosts> v{};
-  // Exact, as the post lies on the globe; |exact - rounded| <= 0.5.
-  std::array<double, kTilePosts> u_exact{};
-  std::array<double, kTilePosts> v_exact{};
-  std::array<double, kTilePosts> longitude_deg{};
-  std::array<double, kTilePosts> latitude_deg{};
+inline constexpr std::int32_t kNoPost = -1;
+
+struct TinVertex {
+  // In the quantized frame of the grid.
+  std::int32_t u = 0;
+  std::int32_t v = 0;
+  // The post that this vertex is, or kNoPost for one that a method has put between posts. Vertices
+  // on the sides are always posts.
+  std::int32_t post = kNoPost;
+  // A multiple of the height step (DESIGN 5.4), so that neighbours decode common vertices alike.
+  double height_m = 0;
+  friend bool operator==(const TinVertex&, const TinVertex&) = default;
 };
 
-TileGrid make_tile_grid(const TilingScheme& scheme, const TileKey& key);
-
-// Index of post (i, j) in a 257 x 257 array, row by row from the south. Ties between posts are
-// broken by it.
-constexpr std::int32_t tile_post_index(std::int32_t i, std::int32_t j) {
-  return j * kTilePosts + i;
-}
-inline constexpr std::size_t kTilePostCount =
-    static_cast<std::size_t>(kTilePosts) * static_cast<std::size_t>(kTilePosts);
-
 struct Tin {
-  // Vertices: tile_post_index of each.
-  std::vector<std::int32_t> posts;
+  std::vector<TinVertex> vertices;
   // Three vertices for each triangle, counter-clockwise in (u, v).
   std::vector<std::uint32_t> indices;
 
   std::size_t triangle_count() const { return indices.size() / 3; }
 };
 
-// The vertices on one side of the tile.
+// By index_of(Side): the vertices that a side must have, or none where this tile decides.
+using FixedBorders = std::array<std::optional<BorderMask>, 4>;
+
+// The vertex that a post is: its height on a step.
+TinVertex vertex_at_post(const PostGrid& grid, std::int32_t post, float height_m,
+                         double height_step_m);
+
+// The vertices on one side of a tile. REQUIRES: the TIN of a tile.
 BorderMask border_of(const Tin& tin, Side side);
 
 }  // namespace qmpipe

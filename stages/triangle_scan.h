@@ -1,6 +1,6 @@
 // Walks the posts that lie in a triangle of a tile, row by row, and evaluates planes on them.
 //
-// Posts are visited at their exact place (TileGrid::u_exact, v_exact), which is where they lie on
+// Posts are visited at their exact place (PostGrid::u_exact, v_exact), which is where they lie on
 // the globe; triangles have corners in whole quantized units. `margin` widens the triangle by that
 // many quantized units on every side: with a margin of 1 every post is visited by each triangle
 // that may hold it whatever the rounding, with a tiny one by exactly one triangle, or by both
@@ -12,7 +12,7 @@
 #include <cstdint>
 
 #include "stages/delaunay.h"
-#include "stages/tin.h"
+#include "stages/post_grid.h"
 
 namespace qmpipe {
 
@@ -48,7 +48,7 @@ struct EdgeBound {
 // it, rows ascending. Only rows j_first..j_last are looked at: pass the rows of the triangle's
 // lowest and highest corner where they are known, else 0 and 256.
 template <class Row>
-void scan_triangle(const TileGrid& grid, const IntPoint& a, const IntPoint& b, const IntPoint& c,
+void scan_triangle(const PostGrid& grid, const IntPoint& a, const IntPoint& b, const IntPoint& c,
                    double margin, std::int32_t j_first, std::int32_t j_last, const Row& row) {
   detail::EdgeBound left[3];
   detail::EdgeBound right[3];
@@ -71,7 +71,7 @@ void scan_triangle(const TileGrid& grid, const IntPoint& a, const IntPoint& b, c
   if (left_count == 1) left[left_count++] = left[0];
   if (right_count == 1) right[right_count++] = right[0];
 
-  constexpr double kPostsPerUnit = static_cast<double>(kTileIntervals) / 32767.0;
+  const double columns_per_u = grid.columns_per_u();
   const double u_low = std::min({a.x, b.x, c.x}) - margin;
   const double u_high = std::max({a.x, b.x, c.x}) + margin;
   const double v_low = std::min({a.y, b.y, c.y}) - margin;
@@ -82,9 +82,9 @@ void scan_triangle(const TileGrid& grid, const IntPoint& a, const IntPoint& b, c
     const double from = std::max({left[0].at(v), left[1].at(v), u_low});
     const double to = std::min({right[0].at(v), right[1].at(v), u_high});
     // from and to are within the tile widened by the margin, so truncation is safe after the shift.
-    const auto i_first = std::max(0, static_cast<std::int32_t>(std::ceil(from * kPostsPerUnit)));
+    const auto i_first = std::max(0, static_cast<std::int32_t>(std::ceil(from * columns_per_u)));
     const auto i_last =
-        std::min(kTileIntervals, static_cast<std::int32_t>(std::floor(to * kPostsPerUnit)));
+        std::min(grid.width_posts - 1, static_cast<std::int32_t>(std::floor(to * columns_per_u)));
     if (i_first <= i_last) row(j, i_first, i_last);
   }
 }

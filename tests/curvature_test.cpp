@@ -38,8 +38,8 @@ Triangle random_triangle(std::mt19937_64& random, std::int32_t extent) {
           .inside = {}};
 }
 
-GeoPoint place(const TileGrid& grid, double i, double j) {
-  const auto at = [](const std::array<double, kTilePosts>& values, double k) {
+GeoPoint place(const PostGrid& grid, double i, double j) {
+  const auto at = [](const std::vector<double>& values, double k) {
     const auto low = static_cast<std::size_t>(k);
     return values[low] + (k - static_cast<double>(low)) *
                              (values[std::min(low + 1, values.size() - 1)] - values[low]);
@@ -47,7 +47,7 @@ GeoPoint place(const TileGrid& grid, double i, double j) {
   return {at(grid.longitude_deg, i), at(grid.latitude_deg, j), 0};
 }
 
-double exact_depth_m(const TileGrid& grid, const Triangle& t) {
+double exact_depth_m(const PostGrid& grid, const Triangle& t) {
   std::array<Vec3, 3> p;
   for (std::size_t k = 0; k < 3; ++k) p[k] = to_ecef(place(grid, t.corners[k].i, t.corners[k].j));
   const GeoPoint inside = place(grid, t.inside.i, t.inside.j);
@@ -83,7 +83,7 @@ TEST(Curvature, DepthOfAChordIsRightToFivePercentUpToEightDegrees) {
       std::mt19937_64 random(seed);
       const auto y =
           static_cast<std::int32_t>(random() % static_cast<std::uint64_t>(kGeodetic.rows(zoom)));
-      const TileGrid grid = make_tile_grid(kGeodetic, {zoom, 0, y});
+      const PostGrid grid = make_tile_grid(kGeodetic, {zoom, 0, y});
       const double spacing_deg = 180.0 / (1 << zoom) / 256;
       const auto longest = std::min(240, static_cast<std::int32_t>(8 / spacing_deg));
       Triangle t = random_triangle(
@@ -101,7 +101,7 @@ TEST(Curvature, DepthOfAChordIsRightToFivePercentUpToEightDegrees) {
 
 TEST(Curvature, TermsOfPostsAreTheSquaresAtTheirExactPlaces) {
   for (const TilingScheme& scheme : {kGeodetic, kMercator}) {
-    const TileGrid grid = make_tile_grid(scheme, {2, 1, 3});
+    const PostGrid grid = make_tile_grid(scheme, {2, 1, 3});
     const CurvatureTerms terms = curvature_terms(grid);
     for (std::size_t k = 0; k < kTilePosts; ++k) {
       ASSERT_NEAR(terms.longitude_squared_at(grid.u_exact[k]), terms.longitude_squared[k], 1e-14);
@@ -119,7 +119,7 @@ TEST(Curvature, LargestSagittaBoundsEveryTriangle) {
       std::mt19937_64 random(seed);
       const auto y =
           static_cast<std::int32_t>(random() % static_cast<std::uint64_t>(kGeodetic.rows(zoom)));
-      const TileGrid grid = make_tile_grid(kGeodetic, {zoom, 0, y});
+      const PostGrid grid = make_tile_grid(kGeodetic, {zoom, 0, y});
       Triangle t = random_triangle(random, 3 + static_cast<std::int32_t>(random() % 250));
       if (!put_post_inside(t)) continue;
       ASSERT_LE(estimated_depth_m(curvature_terms(grid), t), largest_sagitta_m(grid));

@@ -161,7 +161,7 @@ TEST(Delaunay, StaysATriangulationOfTheSquareAfterEveryInsertion) {
       std::mt19937_64 random(seed);
       const std::array<std::int32_t, 4> sizes = {3, 16, 257, 32767};
       const std::int32_t size = sizes[seed % 4];
-      Delaunay mesh(size);
+      Delaunay mesh({size, size});
       for (int k = 0; k < 70; ++k) {
         std::vector<Corners> before;
         for (Index t = 0; t < mesh.triangle_count(); ++t) before.push_back(corners_of(mesh, t));
@@ -181,7 +181,7 @@ TEST(Delaunay, StaysATriangulationOfTheSquareAfterEveryInsertion) {
 TEST(Delaunay, ALargeSetStaysATriangulation) {
   for (const Kind kind : {Kind::kAnywhere, Kind::kTileLattice, Kind::kCluster}) {
     std::mt19937_64 random(11);
-    Delaunay mesh(32767);
+    Delaunay mesh({32767, 32767});
     for (int k = 0; k < 3000; ++k) {
       const Index near = mesh.touched().empty() ? 0 : mesh.touched().back();
       mesh.insert(random_point(kind, 32767, random), near);
@@ -192,7 +192,7 @@ TEST(Delaunay, ALargeSetStaysATriangulation) {
 
 TEST(Delaunay, RepeatedPointsAreNotAddedAgain) {
   std::mt19937_64 random(13);
-  Delaunay mesh(1000);
+  Delaunay mesh({1000, 1000});
   std::vector<IntPoint> points = {{0, 0}, {1000, 0}, {1000, 1000}, {0, 1000}};
   for (int k = 0; k < 100; ++k) {
     points.push_back(random_point(Kind::kAnywhere, 1000, random));
@@ -215,8 +215,8 @@ TEST(Delaunay, TheResultDoesNotDependOnWhereTheSearchStarts) {
       SCOPED_TRACE("kind " + std::to_string(static_cast<int>(kind)) + ", seed " +
                    std::to_string(seed));
       std::mt19937_64 random(seed);
-      Delaunay from_first(4096);
-      Delaunay from_anywhere(4096);
+      Delaunay from_first({4096, 4096});
+      Delaunay from_anywhere({4096, 4096});
       for (int k = 0; k < 150; ++k) {
         const IntPoint point = random_point(kind, 4096, random);
         from_first.insert(point, 0);
@@ -232,7 +232,7 @@ TEST(Delaunay, LocateFindsATriangleThatHoldsThePoint) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
     const Kind kind = kKinds[seed % kKinds.size()];
-    Delaunay mesh(32767);
+    Delaunay mesh({32767, 32767});
     for (int k = 0; k < 200; ++k) mesh.insert(random_point(kind, 32767, random), 0);
     for (int k = 0; k < 500; ++k) {
       const IntPoint p = random_point(kKinds[random() % kKinds.size()], 32767, random);

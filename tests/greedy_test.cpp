@@ -23,49 +23,7 @@ GreedyOptions options_for(double tolerance_m, Curvature curvature) {
           .curvature = curvature};
 }
 
-std::vector<double> vertex_heights(const Tin& tin, const std::vector<float>& heights_m,
-                                   double step_m) {
-  std::vector<double> heights;
-  for (const std::int32_t post : tin.posts) {
-    heights.push_back(
-        std::round(static_cast<double>(heights_m[static_cast<std::size_t>(post)]) / step_m) *
-        step_m);
-  }
-  return heights;
-}
-
-// A neighbour answers for the posts of a fixed side, not this tile.
-std::vector<bool> judged_posts(const Tin& tin, const FixedBorders& fixed) {
-  std::vector<bool> judged(kTilePostCount, true);
-  for (const std::int32_t post : tin.posts) judged[static_cast<std::size_t>(post)] = false;
-  for (const Side side : kSides) {
-    for (std::int32_t k = 0; k < kTilePosts && fixed[index_of(side)]; ++k) {
-      const Post p = side_post(side, k);
-      judged[static_cast<std::size_t>(tile_post_index(p.i, p.j))] = false;
-    }
-  }
-  return judged;
-}
-
-// The largest error of a post that is no vertex, at its exact place on the decoded surface.
-double largest_error_m(const TileGrid& grid, const Tin& tin, const std::vector<float>& heights_m,
-                       double step_m, const FixedBorders& fixed) {
-  const auto places = locate_posts_slowly(grid, corners_of(grid, tin), tin.indices);
-  const auto heights = vertex_heights(tin, heights_m, step_m);
-  const auto judged = judged_posts(tin, fixed);
-  double largest = 0;
-  for (std::size_t k = 0; k < kTilePostCount; ++k) {
-    if (!judged[k]) continue;
-    double surface = 0;
-    for (std::size_t c = 0; c < 3; ++c) {
-      surface += places[k].weights[c] * heights[tin.indices[3 * places[k].triangle + c]];
-    }
-    largest = std::max(largest, std::abs(surface - static_cast<double>(heights_m[k])));
-  }
-  return largest;
-}
-
-void expect_right(const TileGrid& grid, const std::vector<float>& heights_m,
+void expect_right(const PostGrid& grid, const std::vector<float>& heights_m,
                   const FixedBorders& fixed, const GreedyOptions& options) {
   const Tin tin = greedy_insertion(grid, heights_m, fixed, options);
   ASSERT_EQ(fault_of(grid, tin), "");
@@ -74,8 +32,7 @@ void expect_right(const TileGrid& grid, const std::vector<float>& heights_m,
       ASSERT_EQ(border_of(tin, side), *fixed[index_of(side)]) << name_of(side);
     }
   }
-  ASSERT_LE(largest_error_m(grid, tin, heights_m, options.height_step_m, fixed),
-            options.tolerance_m);
+  ASSERT_LE(largest_error_m(grid, tin, heights_m, fixed), options.tolerance_m);
 }
 
 class GreedyOnTerrain : public ::testing::TestWithParam<Terrain> {};
@@ -89,7 +46,7 @@ TEST_P(GreedyOnTerrain, KeepsEveryPostWithinToleranceAndFixedSidesExactly) {
     const FixedBorders fixed = random_borders(random, sides);
     constexpr std::array kTolerances = {1.0, 4.0, 30.0, 200.0};
     // A tile of zoom 9 counts curvature for the small tolerances only.
-    const TileGrid grid = make_tile_grid(kGeodetic, {9, 300, 411});
+    const PostGrid grid = make_tile_grid(kGeodetic, {9, 300, 411});
     GreedyOptions options = options_for(kTolerances[sides % 4], Curvature::kCounts);
     if (GetParam() == Terrain::kNoise) options = options_for(40, Curvature::kCounts);
     expect_right(grid, heights_m, fixed, options);
@@ -115,16 +72,16 @@ TEST_P(GreedyOnTerrain, HoldsItsPromisesInTheMercatorSchemeToo) {
 TEST_P(GreedyOnTerrain, IsDeterministicAndCoarserWithALargerTolerance) {
   std::mt19937_64 random(17);
   const auto heights_m = random_terrain(GetParam(), random);
-  const TileGrid grid = make_tile_grid(kGeodetic, {11, 1200, 800});
+  const PostGrid grid = make_tile_grid(kGeodetic, {11, 1200, 800});
   std::size_t before = kTilePostCount + 1;
   for (const double tolerance_m : {2.0, 20.0, 200.0, 20000.0}) {
     const GreedyOptions options = options_for(tolerance_m, Curvature::kCounts);
     const Tin tin = greedy_insertion(grid, heights_m, {}, options);
     const Tin again = greedy_insertion(grid, heights_m, {}, options);
-    ASSERT_EQ(tin.posts, again.posts);
+    ASSERT_EQ(tin.vertices, again.vertices);
     ASSERT_EQ(tin.indices, again.indices);
-    ASSERT_LE(tin.posts.size(), before);
-    before = tin.posts.size();
+    ASSERT_LE(tin.vertices.size(), before);
+    before = tin.vertices.size();
   }
   EXPECT_EQ(before, 4U);
 }
@@ -165,25 +122,25 @@ TEST(Greedy, OwnerAndHeirTogetherKeepPostsOfTheirSideWithinTolerance) {
     const Tin owner = greedy_insertion(make_tile_grid(kGeodetic, {6, 4, 20}), west_m, {}, options);
     FixedBorders fixed;
     fixed[index_of(Side::kWest)] = border_of(owner, Side::kEast);
-    const TileGrid grid = make_tile_grid(kGeodetic, {6, 5, 20});
+    const PostGrid grid = make_tile_grid(kGeodetic, {6, 5, 20});
     const Tin heir = greedy_insertion(grid, east_m, fixed, options);
     EXPECT_EQ(border_of(heir, Side::kWest), border_of(owner, Side::kEast));
     // No post excused: the owner has kept the side's posts.
-    EXPECT_LE(largest_error_m(grid, heir, east_m, options.height_step_m, {}), options.tolerance_m);
+    EXPECT_LE(largest_error_m(grid, heir, east_m, {}), options.tolerance_m);
   }
 }
 
 TEST(Greedy, AFlatTileOfADeepZoomIsTwoTriangles) {
   const std::vector<float> heights_m(kTilePostCount, 123.4F);
-  const TileGrid grid = make_tile_grid(kGeodetic, {14, 9000, 5000});
+  const PostGrid grid = make_tile_grid(kGeodetic, {14, 9000, 5000});
   const Tin tin = greedy_insertion(grid, heights_m, {}, options_for(1, Curvature::kCounts));
-  EXPECT_EQ(tin.posts.size(), 4U);
+  EXPECT_EQ(tin.vertices.size(), 4U);
   EXPECT_EQ(tin.triangle_count(), 2U);
 }
 
 TEST(Greedy, TheInitialGridIsThereBesideFixedSides) {
   const std::vector<float> heights_m(kTilePostCount, 0.0F);
-  const TileGrid grid = make_tile_grid(kGeodetic, {14, 9000, 5000});
+  const PostGrid grid = make_tile_grid(kGeodetic, {14, 9000, 5000});
   for (const std::int32_t cells : {1, 3, 8, 16, 100, 256}) {
     GreedyOptions options = options_for(1, Curvature::kCounts);
     options.initial_grid_cells = cells;
@@ -195,11 +152,12 @@ TEST(Greedy, TheInitialGridIsThereBesideFixedSides) {
     ASSERT_EQ(border_of(tin, Side::kWest), *fixed[index_of(Side::kWest)]);
     ASSERT_EQ(border_of(tin, Side::kEast).count(), cells + 1);
     // Every grid post but those between the corners of the fixed side, and nothing else.
-    ASSERT_EQ(tin.posts.size(), static_cast<std::size_t>((cells + 1) * (cells + 1) - (cells - 1)));
+    ASSERT_EQ(tin.vertices.size(),
+              static_cast<std::size_t>((cells + 1) * (cells + 1) - (cells - 1)));
     const std::int32_t step = kTileIntervals / cells;
-    for (const std::int32_t post : tin.posts) {
+    for (const TinVertex& vertex : tin.vertices) {
       ASSERT_TRUE(cells == 3 || cells == 100 ||
-                  (post % kTilePosts % step == 0 && post / kTilePosts % step == 0));
+                  (grid.column(vertex.post) % step == 0 && grid.row(vertex.post) % step == 0));
     }
   }
 }
@@ -210,10 +168,10 @@ TEST(Greedy, TiesGoToTheLowestPost) {
   const std::array<std::int32_t, 3> spikes = {tile_post_index(40, 200), tile_post_index(200, 40),
                                               tile_post_index(60, 200)};
   for (const std::int32_t post : spikes) heights_m[static_cast<std::size_t>(post)] = 100;
-  const TileGrid grid = make_tile_grid(kGeodetic, {14, 9000, 5000});
+  const PostGrid grid = make_tile_grid(kGeodetic, {14, 9000, 5000});
   const Tin tin = greedy_insertion(grid, heights_m, {}, options_for(40, Curvature::kIgnored));
-  ASSERT_GE(tin.posts.size(), 5U);
-  EXPECT_EQ(tin.posts[4], *std::min_element(spikes.begin(), spikes.end()));
+  ASSERT_GE(tin.vertices.size(), 5U);
+  EXPECT_EQ(tin.vertices[4].post, *std::min_element(spikes.begin(), spikes.end()));
 }
 
 // How far a triangle's plane lies from a post along the post's vertical, in true ECEF.
@@ -222,20 +180,21 @@ double chord_error_m(const std::array<Vec3, 3>& corners, const Vec3& post, const
   return dot(normal, minus(corners[0], post)) / dot(normal, up);
 }
 
-double largest_chord_error_m(const TileGrid& grid, const Tin& tin,
-                             const std::vector<float>& heights_m, double step_m) {
-  const auto corners = corners_of(grid, tin);
-  const auto heights = vertex_heights(tin, heights_m, step_m);
+double largest_chord_error_m(const PostGrid& grid, const Tin& tin,
+                             const std::vector<float>& heights_m) {
+  const auto corners = corners_of(tin);
   const double width_deg = grid.longitude_deg.back() - grid.longitude_deg.front();
   const double height_deg = grid.latitude_deg.back() - grid.latitude_deg.front();
   std::vector<Vec3> positions;
   for (std::size_t k = 0; k < corners.size(); ++k) {
-    positions.push_back(
-        to_ecef({grid.longitude_deg[0] + corners[k][0] / 32767 * width_deg,
-                 grid.latitude_deg[0] + corners[k][1] / 32767 * height_deg, heights[k]}));
+    positions.push_back(to_ecef({grid.longitude_deg[0] + corners[k][0] / 32767 * width_deg,
+                                 grid.latitude_deg[0] + corners[k][1] / 32767 * height_deg,
+                                 tin.vertices[k].height_m}));
   }
   const auto places = locate_posts_slowly(grid, corners, tin.indices);
-  const auto judged = judged_posts(tin, {});
+  std::vector<bool> judged(kTilePostCount, true);
+  for (const TinVertex& vertex : tin.vertices)
+    judged[static_cast<std::size_t>(vertex.post)] = false;
   double largest = 0;
   for (std::size_t k = 0; k < kTilePostCount; ++k) {
     const double lon_deg = grid.longitude_deg[k % kTilePosts];
@@ -260,14 +219,13 @@ TEST(Greedy, ChordsStayWithinToleranceOfTheTrueGlobe) {
         const Terrain terrain = seed % 2 == 0 ? Terrain::kAllEqual : Terrain::kHills;
         SCOPED_TRACE(to_string(key) + ", seed " + std::to_string(seed));
         const auto heights_m = random_terrain(terrain, random);
-        const TileGrid grid = make_tile_grid(scheme, key);
+        const PostGrid grid = make_tile_grid(scheme, key);
         const double tolerance_m = (seed < 4 ? 4000.0 : 600.0) / (1 << zoom);
         const GreedyOptions options = options_for(tolerance_m, Curvature::kCounts);
         const Tin tin = greedy_insertion(grid, heights_m, {}, options);
         ASSERT_EQ(fault_of(grid, tin), "");
-        EXPECT_LE(largest_chord_error_m(grid, tin, heights_m, options.height_step_m),
-                  1.1 * tolerance_m);
-        EXPECT_LE(largest_error_m(grid, tin, heights_m, options.height_step_m, {}), tolerance_m);
+        EXPECT_LE(largest_chord_error_m(grid, tin, heights_m), 1.1 * tolerance_m);
+        EXPECT_LE(largest_error_m(grid, tin, heights_m, {}), tolerance_m);
       }
     }
   }

@@ -23,11 +23,11 @@ constexpr TileKey kKey = {.zoom = 9, .x = 530, .y = 390};
 constexpr double kSpacingM = 111320.0 * 180 / 512 / 256;
 
 QuantizedMesh mesh_of(const std::vector<float>& heights_m, double tolerance_m) {
-  const TileGrid grid = make_tile_grid(kScheme, kKey);
+  const PostGrid grid = make_tile_grid(kScheme, kKey);
   const Tin tin = strip_ordered(greedy_insertion(
       grid, heights_m, {},
       {.tolerance_m = tolerance_m, .height_step_m = tolerance_m / 64, .initial_grid_cells = 16}));
-  return quantize(grid, tin, heights_m, tolerance_m / 64);
+  return quantize(grid, tin, tolerance_m / 64);
 }
 
 std::vector<float> hills(double roughness_m) {

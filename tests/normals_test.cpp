@@ -26,13 +26,15 @@ std::unique_ptr<LatticeStore> rough_store(std::uint64_t seed, const TilingScheme
   return store;
 }
 
-std::vector<std::int32_t> posts_of_side(Side side) {
-  std::vector<std::int32_t> posts;
+TinVertex at_post(std::int32_t post) { return {.post = post}; }
+
+std::vector<TinVertex> posts_of_side(Side side) {
+  std::vector<TinVertex> vertices;
   for (std::int32_t k = 0; k < kTilePosts; ++k) {
     const Post p = side_post(side, k);
-    posts.push_back(tile_post_index(p.i, p.j));
+    vertices.push_back(at_post(tile_post_index(p.i, p.j)));
   }
-  return posts;
+  return vertices;
 }
 
 TEST(Normals, NeighboursWriteTheSameBytesAlongEveryBorder) {
@@ -46,11 +48,13 @@ TEST(Normals, NeighboursWriteTheSameBytesAlongEveryBorder) {
         for (const Side side : {Side::kEast, Side::kNorth}) {
           const auto there = scheme.neighbour(here, side);
           if (!there) continue;
-          const auto ours = tile_normals(
-              scheme, here, field.window(zoom, Lattice::tile_window(here, 1)), posts_of_side(side));
-          const auto theirs =
-              tile_normals(scheme, *there, field.window(zoom, Lattice::tile_window(*there, 1)),
-                           posts_of_side(opposite(side)));
+          const auto side_normals = [&](const TileKey& key, Side of) {
+            return tile_normals(scheme, key, make_tile_grid(scheme, key),
+                                field.window(zoom, Lattice::tile_window(key, 1)),
+                                posts_of_side(of));
+          };
+          const auto ours = side_normals(here, side);
+          const auto theirs = side_normals(*there, opposite(side));
           ASSERT_EQ(ours, theirs) << to_string(here) << " " << name_of(side);
         }
       }
@@ -129,14 +133,37 @@ TEST(Normals, BytesAreTheEncodedLatticeNormalsInTheOrderAsked) {
   const Heightfield field(*store, kMercator, {}, {});
   const TileKey key = {1, 1, 1};
   const WindowHeights heights = field.window(1, Lattice::tile_window(key, 1));
-  const std::vector<std::int32_t> posts = {tile_post_index(256, 256), tile_post_index(3, 9),
-                                           tile_post_index(0, 128)};
-  const auto normals = tile_normals(kMercator, key, heights, posts);
-  ASSERT_EQ(normals.size(), posts.size());
-  for (std::size_t k = 0; k < posts.size(); ++k) {
-    const Post post = {256 + posts[k] % kTilePosts, 256 + posts[k] / kTilePosts};
+  const std::vector<TinVertex> vertices = {at_post(tile_post_index(256, 256)),
+                                           at_post(tile_post_index(3, 9)),
+                                           at_post(tile_post_index(0, 128))};
+  const PostGrid grid = make_tile_grid(kMercator, key);
+  const auto normals = tile_normals(kMercator, key, grid, heights, vertices);
+  ASSERT_EQ(normals.size(), vertices.size());
+  for (std::size_t k = 0; k < vertices.size(); ++k) {
+    const Post post = {256 + grid.column(vertices[k].post), 256 + grid.row(vertices[k].post)};
     EXPECT_EQ(normals[k], encode_oct_normal(lattice_normal(Lattice(kMercator, 1), heights, post)));
   }
+}
+
+TEST(Normals, AVertexBetweenPostsLooksTheWayOfTheFourAroundIt) {
+  const auto store = rough_store(9, kMercator, 1);
+  const Heightfield field(*store, kMercator, {}, {});
+  const TileKey key = {1, 1, 1};
+  const WindowHeights heights = field.window(1, Lattice::tile_window(key, 1));
+  const PostGrid grid = make_tile_grid(kMercator, key);
+  const auto normal = [&](std::int32_t i, std::int32_t j) {
+    return lattice_normal(Lattice(kMercator, 1), heights, {256 + i, 256 + j});
+  };
+  const auto near = [&](std::int32_t u, std::int32_t v, const Vec3& expected) {
+    const TinVertex vertex = {.u = u, .v = v};
+    const auto normals = tile_normals(kMercator, key, grid, heights, {&vertex, 1});
+    const Vec3 got = decode_oct_normal(normals.at(0));
+    EXPECT_GT(dot(got, expected), 0.9998) << u << " " << v;
+  };
+  near(grid.u[100], grid.v[50], normal(100, 50));
+  near(grid.u[100] + 64, grid.v[50], unit(plus(normal(100, 50), normal(101, 50))));
+  near(grid.u[7], (grid.v[30] + grid.v[31]) / 2, unit(plus(normal(7, 30), normal(7, 31))));
+  near(32766, 32766, normal(256, 256));
 }
 
 }  // namespace

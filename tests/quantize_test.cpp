@@ -20,13 +20,13 @@ using namespace testing;  // NOLINT(google-build-using-namespace): the fixture, 
 const TilingScheme kGeodetic(Projection::kGeodetic);
 const TilingScheme kMercator(Projection::kMercator);
 
-RectangleDeg rectangle_of(const TileGrid& grid) {
+RectangleDeg rectangle_of(const PostGrid& grid) {
   return {grid.longitude_deg.front(), grid.latitude_deg.front(), grid.longitude_deg.back(),
           grid.latitude_deg.back()};
 }
 
 struct Tile {
-  TileGrid grid;
+  PostGrid grid;
   std::vector<float> heights_m;
   Tin tin;
   QuantizedMesh mesh;
@@ -40,7 +40,7 @@ Tile make_tile(const TilingScheme& scheme, const TileKey& key, std::vector<float
   tile.tin = strip_ordered(greedy_insertion(
       tile.grid, tile.heights_m, fixed,
       {.tolerance_m = tolerance_m, .height_step_m = step_m, .curvature = Curvature::kIgnored}));
-  tile.mesh = quantize(tile.grid, tile.tin, tile.heights_m, step_m);
+  tile.mesh = quantize(tile.grid, tile.tin, step_m);
   return tile;
 }
 
@@ -69,8 +69,8 @@ TEST(Quantize, VerticesDecodeToTheirSnappedHeights) {
     const double rounding_m = ulp_m(std::max(std::abs(low_m), std::abs(high_m))) / 2 + 1e-9;
     double lowest_m = 1e9;
     double highest_m = -1e9;
-    for (std::size_t k = 0; k < tile.tin.posts.size(); ++k) {
-      const auto post = static_cast<std::size_t>(tile.tin.posts[k]);
+    for (std::size_t k = 0; k < tile.tin.vertices.size(); ++k) {
+      const auto post = static_cast<std::size_t>(tile.tin.vertices[k].post);
       const double snapped_m = snapped_height(static_cast<double>(tile.heights_m[post]), 0.5);
       ASSERT_NEAR(decoded_height_m(tile.mesh, k), snapped_m, rounding_m);
       ASSERT_LE(tile.mesh.h[k], kQuantizedMax);
@@ -89,9 +89,9 @@ TEST(Quantize, PlacesAreThePostsRoundedAndSideListsCompleteAndSorted) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Tile tile = random_tile(seed);
     std::array<std::map<std::int32_t, std::uint32_t>, 4> expected;
-    for (std::uint32_t k = 0; k < tile.tin.posts.size(); ++k) {
-      const std::int32_t i = tile.tin.posts[k] % kTilePosts;
-      const std::int32_t j = tile.tin.posts[k] / kTilePosts;
+    for (std::uint32_t k = 0; k < tile.tin.vertices.size(); ++k) {
+      const std::int32_t i = tile.tin.vertices[k].post % kTilePosts;
+      const std::int32_t j = tile.tin.vertices[k].post / kTilePosts;
       ASSERT_EQ(tile.mesh.u[k], std::lround(i * 32767.0 / 256));
       ASSERT_NEAR(tile.mesh.v[k], tile.grid.v_exact[static_cast<std::size_t>(j)], 0.5);
       if (i == 0) expected[0][j] = k;
@@ -184,7 +184,7 @@ TEST(Quantize, TheSphereHoldsEveryVertexAndTheOcclusionPointStandsOutside) {
 // The bounding sphere of the mercator root stands at the earth's centre: no direction leads there.
 TEST(Quantize, AFlatRootHasAFiniteHeader) {
   for (const TilingScheme& scheme : {kGeodetic, kMercator}) {
-    const TileGrid grid = make_tile_grid(scheme, {0, 0, 0});
+    const PostGrid grid = make_tile_grid(scheme, {0, 0, 0});
     const std::vector<float> heights_m(kTilePostCount, 0.0F);
     for (const std::int32_t cells : {0, 2, 16}) {
       const Tin tin = strip_ordered(greedy_insertion(grid, heights_m, {},
@@ -192,7 +192,7 @@ TEST(Quantize, AFlatRootHasAFiniteHeader) {
                                                       .height_step_m = 64,
                                                       .initial_grid_cells = cells,
                                                       .curvature = Curvature::kIgnored}));
-      const QuantizedMesh mesh = quantize(grid, tin, heights_m, 64);
+      const QuantizedMesh mesh = quantize(grid, tin, 64);
       const double magnitude = length(mesh.header.horizon_occlusion_point);
       EXPECT_GT(mesh.header.sphere_radius_m, 1e6);
       EXPECT_TRUE(magnitude >= 1 && magnitude <= 1.001e6) << magnitude;
@@ -203,8 +203,9 @@ TEST(Quantize, AFlatRootHasAFiniteHeader) {
 std::vector<std::array<std::int32_t, 3>> triangles_by_post(const Tin& tin) {
   std::vector<std::array<std::int32_t, 3>> triangles;
   for (std::size_t t = 0; t < tin.indices.size(); t += 3) {
-    std::array<std::int32_t, 3> c = {tin.posts[tin.indices[t]], tin.posts[tin.indices[t + 1]],
-                                     tin.posts[tin.indices[t + 2]]};
+    std::array<std::int32_t, 3> c = {tin.vertices[tin.indices[t]].post,
+                                     tin.vertices[tin.indices[t + 1]].post,
+                                     tin.vertices[tin.indices[t + 2]].post};
     std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
     triangles.push_back(c);
   }
@@ -216,7 +217,7 @@ TEST(MeshOrder, KeepsTheTrianglesAndNumbersVerticesByFirstUse) {
   for (std::uint64_t seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
-    const TileGrid grid = make_tile_grid(kGeodetic, {9, 3, 200});
+    const PostGrid grid = make_tile_grid(kGeodetic, {9, 3, 200});
     const auto heights_m = random_terrain(kTerrains[seed % kTerrains.size()], random);
     const Tin tin = greedy_insertion(grid, heights_m, {}, {.tolerance_m = 50, .height_step_m = 2});
     const Tin ordered = strip_ordered(tin);
@@ -227,9 +228,9 @@ TEST(MeshOrder, KeepsTheTrianglesAndNumbersVerticesByFirstUse) {
       ASSERT_LE(index, next);
       if (index == next) ++next;
     }
-    ASSERT_EQ(next, ordered.posts.size());
+    ASSERT_EQ(next, ordered.vertices.size());
     const Tin again = strip_ordered(tin);
-    ASSERT_EQ(again.posts, ordered.posts);
+    ASSERT_EQ(again.vertices, ordered.vertices);
     ASSERT_EQ(again.indices, ordered.indices);
   }
 }

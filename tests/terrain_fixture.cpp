@@ -80,7 +80,7 @@ double cross_of(const std::array<double, 2>& a, const std::array<double, 2>& b, 
 }
 
 // Tries the posts of one triangle's bounding box and keeps the place that lies deepest inside.
-void try_triangle(const TileGrid& grid, const std::array<std::array<double, 2>, 3>& c,
+void try_triangle(const PostGrid& grid, const std::array<std::array<double, 2>, 3>& c,
                   std::size_t triangle, std::vector<Place>& places, std::vector<double>& depths) {
   const auto [west, east] = std::minmax({c[0][0], c[1][0], c[2][0]});
   const auto [south, north] = std::minmax({c[0][1], c[1][1], c[2][1]});
@@ -164,7 +164,7 @@ FixedBorders random_borders(std::mt19937_64& random, unsigned sides) {
   return fixed;
 }
 
-std::vector<Place> locate_posts_slowly(const TileGrid& grid,
+std::vector<Place> locate_posts_slowly(const PostGrid& grid,
                                        std::span<const std::array<double, 2>> corners,
                                        std::span<const std::uint32_t> indices) {
   std::vector<Place> places(kTilePostCount);
@@ -177,32 +177,43 @@ std::vector<Place> locate_posts_slowly(const TileGrid& grid,
   return places;
 }
 
-std::vector<std::array<double, 2>> corners_of(const TileGrid& grid, const Tin& tin) {
+std::vector<std::array<double, 2>> corners_of(const Tin& tin) {
   std::vector<std::array<double, 2>> corners;
-  corners.reserve(tin.posts.size());
-  for (const std::int32_t post : tin.posts) {
-    corners.push_back({static_cast<double>(grid.u[static_cast<std::size_t>(post % kTilePosts)]),
-                       static_cast<double>(grid.v[static_cast<std::size_t>(post / kTilePosts)])});
+  corners.reserve(tin.vertices.size());
+  for (const TinVertex& vertex : tin.vertices) {
+    corners.push_back({static_cast<double>(vertex.u), static_cast<double>(vertex.v)});
   }
   return corners;
 }
 
-std::string fault_of(const TileGrid& grid, const Tin& tin) {
-  const auto corners = corners_of(grid, tin);
-  auto sorted = tin.posts;
+std::string fault_of(const PostGrid& grid, const Tin& tin) {
+  const auto corners = corners_of(tin);
+  const double east = grid.u.back();
+  const double north = grid.v.back();
+  auto sorted = corners;
   std::sort(sorted.begin(), sorted.end());
   if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) return "a vertex twice";
-  for (const std::int32_t corner : {tile_post_index(0, 0), tile_post_index(256, 0),
-                                    tile_post_index(0, 256), tile_post_index(256, 256)}) {
+  for (const std::array<double, 2> corner :
+       {std::array{0.0, 0.0}, {east, 0.0}, {0.0, north}, {east, north}}) {
     if (!std::binary_search(sorted.begin(), sorted.end(), corner)) return "a corner is missing";
+  }
+  for (const TinVertex& vertex : tin.vertices) {
+    const bool on_side =
+        vertex.u == 0 || vertex.v == 0 || vertex.u == grid.u.back() || vertex.v == grid.v.back();
+    if (on_side && vertex.post == kNoPost) return "a vertex on a side that is no post";
+    if (vertex.post != kNoPost &&
+        (grid.u[static_cast<std::size_t>(grid.column(vertex.post))] != vertex.u ||
+         grid.v[static_cast<std::size_t>(grid.row(vertex.post))] != vertex.v)) {
+      return "a vertex away from its post";
+    }
   }
   if (tin.indices.empty() || tin.indices.size() % 3 != 0) return "broken triangles";
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
-  std::vector<bool> used(tin.posts.size(), false);
+  std::vector<bool> used(tin.vertices.size(), false);
   double area = 0;
   for (std::size_t t = 0; t < tin.indices.size(); t += 3) {
     const std::array<std::uint32_t, 3> k = {tin.indices[t], tin.indices[t + 1], tin.indices[t + 2]};
-    if (std::max({k[0], k[1], k[2]}) >= tin.posts.size()) return "an index without a vertex";
+    if (std::max({k[0], k[1], k[2]}) >= tin.vertices.size()) return "an index without a vertex";
     const double twice = cross_of(corners[k[0]], corners[k[1]], corners[k[2]][0], corners[k[2]][1]);
     if (twice <= 0) return "a triangle that is not counter-clockwise";
     area += twice;
@@ -212,16 +223,42 @@ std::string fault_of(const TileGrid& grid, const Tin& tin) {
     }
   }
   if (std::find(used.begin(), used.end(), false) != used.end()) return "a vertex without triangles";
-  if (area != 2.0 * kQuantizedMax * kQuantizedMax) return "the square is not covered once";
+  if (area != 2.0 * east * north) return "the rectangle is not covered once";
   for (const auto& [edge, count] : edges) {
     if (edges.count({edge.second, edge.first}) != 0) continue;
     const auto& a = corners[edge.first];
     const auto& b = corners[edge.second];
-    const bool on_side = (a[0] == b[0] && (a[0] == 0 || a[0] == kQuantizedMax)) ||
-                         (a[1] == b[1] && (a[1] == 0 || a[1] == kQuantizedMax));
+    const bool on_side = (a[0] == b[0] && (a[0] == 0 || a[0] == east)) ||
+                         (a[1] == b[1] && (a[1] == 0 || a[1] == north));
     if (!on_side) return "an edge inside with one triangle";
   }
   return "";
+}
+
+double largest_error_m(const PostGrid& grid, const Tin& tin, std::span<const float> heights_m,
+                       const FixedBorders& fixed) {
+  const auto places = locate_posts_slowly(grid, corners_of(tin), tin.indices);
+  std::vector<bool> judged(kTilePostCount, true);
+  for (const TinVertex& vertex : tin.vertices) {
+    if (vertex.post != kNoPost) judged[static_cast<std::size_t>(vertex.post)] = false;
+  }
+  for (const Side side : kSides) {
+    for (std::int32_t k = 0; k < kTilePosts && fixed[index_of(side)]; ++k) {
+      const Post p = side_post(side, k);
+      judged[static_cast<std::size_t>(tile_post_index(p.i, p.j))] = false;
+    }
+  }
+  double largest = 0;
+  for (std::size_t k = 0; k < kTilePostCount; ++k) {
+    if (!judged[k]) continue;
+    double surface = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      surface +=
+          places[k].weights[c] * tin.vertices[tin.indices[3 * places[k].triangle + c]].height_m;
+    }
+    largest = std::max(largest, std::abs(surface - static_cast<double>(heights_m[k])));
+  }
+  return largest;
 }
 
 }  // namespace qmpipe::testing

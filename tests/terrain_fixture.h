@@ -49,15 +49,20 @@ struct Place {
 };
 // For each of the tile's posts at its exact place, found by trying every triangle's bounding box in
 // doubles. A post on an edge gets either triangle. `corners`: (u, v) of each vertex.
-std::vector<Place> locate_posts_slowly(const TileGrid& grid,
+std::vector<Place> locate_posts_slowly(const PostGrid& grid,
                                        std::span<const std::array<double, 2>> corners,
                                        std::span<const std::uint32_t> indices);
 // (u, v) of each vertex, as the file stores it.
-std::vector<std::array<double, 2>> corners_of(const TileGrid& grid, const Tin& tin);
+std::vector<std::array<double, 2>> corners_of(const Tin& tin);
 
-// What is wrong with a TIN as a partition of its square: corners, orientation, area, twins, vertices
-// used; empty when nothing is.
-std::string fault_of(const TileGrid& grid, const Tin& tin);
+// What is wrong with a TIN as a partition of its rectangle: corners, orientation, area, twins,
+// vertices used, posts at their places; empty when nothing is.
+std::string fault_of(const PostGrid& grid, const Tin& tin);
+
+// The largest error of a tile's post that is no vertex, at its exact place on the TIN's surface.
+// Posts of fixed sides do not count: a neighbour answers for them.
+double largest_error_m(const PostGrid& grid, const Tin& tin, std::span<const float> heights_m,
+                       const FixedBorders& fixed);
 
 template <class HeightOf>
 void fill_zoom(LatticeStore& store, const Lattice& lattice, const HeightOf& height_of) {

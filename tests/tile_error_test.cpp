@@ -15,7 +15,7 @@ namespace {
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixture, in a test
 
 struct Case {
-  TileGrid grid;
+  PostGrid grid;
   Tin tin;
   QuantizedMesh mesh;
   std::vector<float> heights_m;
@@ -31,7 +31,7 @@ Case random_case(std::uint64_t seed) {
   c.tin = strip_ordered(
       greedy_insertion(c.grid, c.heights_m, {},
                        {.tolerance_m = 40, .height_step_m = 1, .curvature = Curvature::kIgnored}));
-  c.mesh = quantize(c.grid, c.tin, c.heights_m, 1);
+  c.mesh = quantize(c.grid, c.tin, 1);
   // Judged against other heights than it was made from, so that errors are large too.
   for (float& h : c.heights_m) h += static_cast<float>(random() % 100) / 10;
   for (std::size_t k = 0; k < kTilePostCount; ++k) {
@@ -43,7 +43,7 @@ Case random_case(std::uint64_t seed) {
 
 // Decoded heights interpolated at exact places; a vertex where the file puts it.
 std::vector<double> errors_slowly(const Case& c) {
-  const auto places = locate_posts_slowly(c.grid, corners_of(c.grid, c.tin), c.mesh.indices);
+  const auto places = locate_posts_slowly(c.grid, corners_of(c.tin), c.mesh.indices);
   std::vector<double> surface(kTilePostCount, 0);
   for (std::size_t k = 0; k < kTilePostCount; ++k) {
     for (std::size_t corner = 0; corner < 3; ++corner) {
@@ -51,8 +51,8 @@ std::vector<double> errors_slowly(const Case& c) {
                     decoded_height_m(c.mesh, c.mesh.indices[3 * places[k].triangle + corner]);
     }
   }
-  for (std::size_t v = 0; v < c.tin.posts.size(); ++v) {
-    surface[static_cast<std::size_t>(c.tin.posts[v])] = decoded_height_m(c.mesh, v);
+  for (std::size_t v = 0; v < c.tin.vertices.size(); ++v) {
+    surface[static_cast<std::size_t>(c.tin.vertices[v].post)] = decoded_height_m(c.mesh, v);
   }
   std::vector<double> errors;
   for (std::size_t k = 0; k < kTilePostCount; ++k) {

@@ -30,15 +30,15 @@ FixedBorders regular_borders() {
 std::vector<std::uint8_t> make_tile(const SetPlan& plan, const TileKey& key) {
   const WindowHeights with_halo = plan.heights(key.zoom, Lattice::tile_window(key, 1));
   const WindowHeights own = plan.heights(key.zoom, Lattice::tile_window(key, 0));
-  const TileGrid grid = make_tile_grid(plan.scheme, key);
+  const PostGrid grid = make_tile_grid(plan.scheme, key);
   const Tin tin =
       strip_ordered(greedy_insertion(grid, own.heights_m, regular_borders(),
                                      {.tolerance_m = std::ldexp(plan.root_tolerance_m, -key.zoom),
                                       .height_step_m = plan.height_step_m,
                                       .initial_grid_cells = 8,
                                       .curvature = Curvature::kIgnored}));
-  QuantizedMesh mesh = quantize(grid, tin, own.heights_m, plan.height_step_m);
-  mesh.normals = tile_normals(plan.scheme, key, with_halo, tin.posts);
+  QuantizedMesh mesh = quantize(grid, tin, plan.height_step_m);
+  mesh.normals = tile_normals(plan.scheme, key, grid, with_halo, tin.vertices);
   return gzip_compress(encode(mesh), 1);
 }
 
