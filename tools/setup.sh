@@ -7,7 +7,7 @@ set -euo pipefail
 
 build_packages=(
   g++ cmake ninja-build ccache git ca-certificates pkg-config
-  libtbb-dev libgdal-dev libproj-dev libhdf5-dev libzstd-dev libdeflate-dev libmeshoptimizer-dev
+  libtbb-dev libgdal-dev libproj-dev libhdf5-dev libzstd-dev libdeflate-dev libmeshoptimizer-dev libcgal-dev
   libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   gdal-bin python3
