@@ -34,16 +34,13 @@ std::vector<std::string> violated_rules(const BuildOptions& options) {
           fmt::format("--max-zoom must be 0..{}", kMaxZoom));
   require(!mesh.max_zoom || *mesh.max_zoom >= mesh.min_zoom,
           "--max-zoom must not be less than --min-zoom");
-  require(
-      is_tolerance(mesh.root_tolerance_m),
-      fmt::format("--tolerance must be {}..{} metres", kSmallestToleranceM, kLargestToleranceM));
   for (const auto& [zoom, tolerance_m] : mesh.tolerance_at_m) {
     require(zoom >= 0 && zoom <= kMaxZoom && is_tolerance(tolerance_m),
             fmt::format("--tolerance-at {}={}: the zoom must be 0..{}, the tolerance {}..{} metres",
                         zoom, tolerance_m, kMaxZoom, kSmallestToleranceM, kLargestToleranceM));
   }
-  require(mesh.initial_grid_cells >= 0 && mesh.initial_grid_cells <= kTileIntervals,
-          fmt::format("--grid must be 0..{} cells", kTileIntervals));
+  require(mesh.method == Method::kEdgeCollapse || mesh.stop == Stop::kTolerance,
+          "--stop edges is for --method edge-collapse only");
   require(!options.encode.gzip_level ||
               (*options.encode.gzip_level >= 1 && *options.encode.gzip_level <= 12),
           "--gzip must be 1..12 or none");
@@ -60,8 +57,14 @@ std::vector<std::string> violated_rules(const BuildOptions& options) {
 
 double tolerance_at(const MeshOptions& options, std::int32_t zoom) {
   const auto own = options.tolerance_at_m.find(zoom);
-  return own != options.tolerance_at_m.end() ? own->second
-                                             : std::ldexp(options.root_tolerance_m, -zoom);
+  return own != options.tolerance_at_m.end() ? own->second : options.parameters.of("g_e").at(zoom);
+}
+
+ParameterValues parameters_at(const MeshOptions& options, std::int32_t zoom) {
+  MethodParameters parameters = options.parameters;
+  const auto own = options.tolerance_at_m.find(zoom);
+  if (own != options.tolerance_at_m.end()) parameters.set("g_e", ZoomSeries({own->second}));
+  return values_at(parameters, options.method, options.stop, zoom);
 }
 
 }  // namespace qmpipe

@@ -29,14 +29,14 @@ struct MeshOptions {
   std::int32_t min_zoom = 0;
   // DEFAULT: the sampling zoom, that is the coarsest whose posts are no wider apart than the pixels.
   std::optional<std::int32_t> max_zoom;
+  // DEFAULT: greedy.
   Method method = Method::kGreedy;
-  // Metres at zoom 0, halved at each deeper one. DEFAULT: 15000, as in Campos et al. 2020, Table 3.
-  double root_tolerance_m = 15000;
-  // Zooms with a tolerance of their own.
+  // What ends edge collapse. DEFAULT: the tolerance.
+  Stop stop = Stop::kTolerance;
+  // DEFAULT: Campos et al. 2020, Table 3.
+  MethodParameters parameters;
+  // Zooms with a tolerance of their own, in place of the parameter g_e.
   std::map<std::int32_t, double> tolerance_at_m;
-  // Cells a side of the regular grid that greedy insertion starts with. DEFAULT: 0, because the
-  // curvature of the globe is part of the error and puts vertices where they are needed.
-  std::int32_t initial_grid_cells = 0;
   // DEFAULT: mean.
   Reduction reduction = Reduction::kMean;
   // DEFAULT: pull.
@@ -84,7 +84,11 @@ struct BuildOptions {
 // Every rule that the options break, each a sentence that names the option; empty when all is well.
 std::vector<std::string> violated_rules(const BuildOptions& options);
 
-// The tolerance g(z) in metres.
+// The tolerance g(z) in metres. Methods without an error bound take their height steps from it.
 double tolerance_at(const MeshOptions& options, std::int32_t zoom);
+
+// The method's parameters at a zoom, g_e being the tolerance. Throws UsageError for a value that is
+// out of its range there.
+ParameterValues parameters_at(const MeshOptions& options, std::int32_t zoom);
 
 }  // namespace qmpipe

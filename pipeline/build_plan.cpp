@@ -111,7 +111,7 @@ Recipe recipe_for(const BuildOptions& options, const Survey& survey,
   recipe.reduction = options.mesh.reduction;
   recipe.voids = options.mesh.voids;
   recipe.method = options.mesh.method;
-  recipe.initial_grid_cells = options.mesh.initial_grid_cells;
+  recipe.stop = options.mesh.stop;
   recipe.normals = options.encode.normals;
   for (std::int32_t zoom = 0; zoom <= survey.max_zoom; ++zoom) {
     const double tolerance_m = tolerance_at(options.mesh, zoom);
@@ -122,6 +122,9 @@ Recipe recipe_for(const BuildOptions& options, const Survey& survey,
     }
     recipe.tolerance_m.push_back(tolerance_m);
     recipe.height_step_m.push_back(*step);
+    for (const auto& [name, value] : parameters_at(options.mesh, zoom)) {
+      if (name != "g_e") recipe.parameters[name].push_back(value);
+    }
   }
   return recipe;
 }

@@ -39,19 +39,26 @@ json parameters_of(const BuildOptions& options) {
   for (const auto& [zoom, metres] : mesh.tolerance_at_m) {
     tolerance_at[std::to_string(zoom)] = metres;
   }
-  return {{"--source-crs", options.input.source_crs},
-          {"--resampling", name_of(options.input.resampling)},
-          {"--reduce", name_of(mesh.reduction)},
-          {"--nodata", name_of(mesh.voids)},
-          {"--scheme", mesh.projection == Projection::kGeodetic ? "geodetic" : "mercator"},
-          {"--min-zoom", mesh.min_zoom},
-          {"--max-zoom", mesh.max_zoom ? json(*mesh.max_zoom) : json("from the pixels")},
-          {"--method", name_of(mesh.method)},
-          {"--tolerance", mesh.root_tolerance_m},
-          {"--tolerance-at", tolerance_at},
-          {"--grid", mesh.initial_grid_cells},
-          {"--gzip", options.encode.gzip_level ? json(*options.encode.gzip_level) : json("none")},
-          {"normals", options.encode.normals}};
+  json parameters = {
+      {"--source-crs", options.input.source_crs},
+      {"--resampling", name_of(options.input.resampling)},
+      {"--reduce", name_of(mesh.reduction)},
+      {"--nodata", name_of(mesh.voids)},
+      {"--scheme", mesh.projection == Projection::kGeodetic ? "geodetic" : "mercator"},
+      {"--min-zoom", mesh.min_zoom},
+      {"--max-zoom", mesh.max_zoom ? json(*mesh.max_zoom) : json("from the pixels")},
+      {"--method", name_of(mesh.method)},
+      {"--stop", name_of(mesh.stop)},
+      {"--tolerance-at", tolerance_at},
+      {"--gzip", options.encode.gzip_level ? json(*options.encode.gzip_level) : json("none")},
+      {"normals", options.encode.normals}};
+  for (const ParameterInfo& info : parameters_of(mesh.method, mesh.stop)) {
+    parameters[info.name] = mesh.parameters.of(info.name).text();
+  }
+  // Height steps come from it whatever the method.
+  parameters.erase("g_e");
+  parameters["g_e (--tolerance)"] = mesh.parameters.of("g_e").text();
+  return parameters;
 }
 
 // The members that one of the objects has otherwise than the other, or not at all.

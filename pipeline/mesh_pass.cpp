@@ -19,6 +19,8 @@ namespace {
 BuildReport empty_report(const BuildOptions& options, const BuildPlan& plan,
                          const MemoryPlan& memory) {
   BuildReport report;
+  report.method = plan.recipe.method;
+  report.stop = plan.recipe.stop;
   report.threads = options.run.threads;
   report.max_in_flight = memory.max_in_flight;
   report.expected_peak_bytes = memory.expected_peak_bytes;
@@ -26,8 +28,9 @@ BuildReport empty_report(const BuildOptions& options, const BuildPlan& plan,
     const auto at = static_cast<std::size_t>(zoom);
     BuiltZoom& row = report.zooms.emplace_back();
     row.zoom = zoom;
-    row.tolerance_m = plan.recipe.tolerance_m[at];
+    row.tolerance_m = plan.recipe.error_bound_m(zoom);
     row.height_step_m = plan.recipe.height_step_m[at];
+    row.parameters = plan.recipe.parameters_at(zoom);
   }
   return report;
 }

@@ -24,7 +24,6 @@ constexpr Named<Reduction> kReductions[] = {{Reduction::kMean, "mean"},
                                             {Reduction::kSubsample, "subsample"},
                                             {Reduction::kMax, "max"},
                                             {Reduction::kMin, "min"}};
-constexpr Named<Method> kMethods[] = {{Method::kGreedy, "greedy"}};
 
 template <class Value, std::size_t kCount>
 std::string name_in(const Named<Value> (&table)[kCount], Value value) {
@@ -71,6 +70,15 @@ bool read_value(const json& value, std::vector<double>& into) {
   return true;
 }
 
+bool read_value(const json& value, std::map<std::string, std::vector<double>>& into) {
+  if (!value.is_object()) return false;
+  into.clear();
+  for (const auto& [name, list] : value.items()) {
+    if (!read_value(list, into[name])) return false;
+  }
+  return true;
+}
+
 // Leaves the first problem that was met in `problem`.
 template <class Value>
 void read_member(const json& object, const char* name, Value& into, std::string& problem) {
@@ -107,14 +115,12 @@ Result<Projection> projection_named(const std::string& name) {
 
 std::string name_of(Resampling resampling) { return name_in(kResamplings, resampling); }
 std::string name_of(Reduction reduction) { return name_in(kReductions, reduction); }
-std::string name_of(Method method) { return name_in(kMethods, method); }
 Result<Resampling> resampling_named(const std::string& name) {
   return value_in(kResamplings, name, "resampling");
 }
 Result<Reduction> reduction_named(const std::string& name) {
   return value_in(kReductions, name, "reduction");
 }
-Result<Method> method_named(const std::string& name) { return value_in(kMethods, name, "method"); }
 
 std::string name_of(const VoidPolicy& policy) {
   return policy.kind == VoidPolicy::Kind::kPull ? "pull"
@@ -137,6 +143,19 @@ Result<VoidPolicy> void_policy_named(const std::string& name) {
       name)};
 }
 
+std::optional<double> Recipe::error_bound_m(std::int32_t zoom) const {
+  const auto at = static_cast<std::size_t>(zoom);
+  if (!has_error_bound(method, stop) || at >= tolerance_m.size()) return std::nullopt;
+  return tolerance_m[at];
+}
+
+ParameterValues Recipe::parameters_at(std::int32_t zoom) const {
+  const auto at = static_cast<std::size_t>(zoom);
+  ParameterValues values = {{"g_e", tolerance_m[at]}};
+  for (const auto& [name, by_zoom] : parameters) values[name] = by_zoom[at];
+  return values;
+}
+
 std::string write_recipe(const Recipe& recipe) {
   const json object = {
       {"program_version", recipe.program_version},
@@ -151,7 +170,8 @@ std::string write_recipe(const Recipe& recipe) {
       {"method", name_of(recipe.method)},
       {"tolerance_m", recipe.tolerance_m},
       {"height_step_m", recipe.height_step_m},
-      {"grid", recipe.initial_grid_cells},
+      {"stop", name_of(recipe.stop)},
+      {"parameters", recipe.parameters},
       {"normals", recipe.normals}};
   return object.dump();
 }
@@ -173,7 +193,8 @@ Result<Recipe> parse_recipe(const std::string& text) {
   read_named(object, "method", method_named, recipe.method, problem);
   read_member(object, "tolerance_m", recipe.tolerance_m, problem);
   read_member(object, "height_step_m", recipe.height_step_m, problem);
-  read_member(object, "grid", recipe.initial_grid_cells, problem);
+  read_named(object, "stop", stop_named, recipe.stop, problem);
+  read_member(object, "parameters", recipe.parameters, problem);
   read_member(object, "normals", recipe.normals, problem);
   if (!problem.empty()) return Error{problem};
   if (recipe.min_zoom < 0 || recipe.max_zoom < recipe.min_zoom ||
@@ -183,6 +204,11 @@ Result<Recipe> parse_recipe(const std::string& text) {
   const auto zooms = static_cast<std::size_t>(recipe.max_zoom) + 1;
   if (recipe.tolerance_m.size() != zooms || recipe.height_step_m.size() != zooms) {
     return Error{"the recipe does not list one tolerance and one height step for each zoom"};
+  }
+  for (const auto& [name, values] : recipe.parameters) {
+    if (values.size() != zooms) {
+      return Error{fmt::format("the recipe does not list one {} for each zoom", name)};
+    }
   }
   return recipe;
 }

@@ -5,18 +5,19 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "formats/result.h"
+#include "pipeline/method.h"
 #include "scheduler/tiling_scheme.h"
 #include "stages/heightfield.h"
 #include "stages/reduce.h"
 #include "stages/sampling.h"
 
 namespace qmpipe {
-
-enum class Method { kGreedy };
 
 struct Recipe {
   std::string program_version;
@@ -29,22 +30,26 @@ struct Recipe {
   Reduction reduction = Reduction::kMean;
   VoidPolicy voids;
   Method method = Method::kGreedy;
-  // By zoom, 0..max_zoom.
+  Stop stop = Stop::kTolerance;
+  // By zoom, 0..max_zoom. A bound of the error where has_error_bound(), else the scale of the heights.
   std::vector<double> tolerance_m;
   std::vector<double> height_step_m;
-  std::int32_t initial_grid_cells = 0;
+  // The method's own parameters but g_e, by zoom.
+  std::map<std::string, std::vector<double>> parameters;
   bool normals = true;
+
+  std::optional<double> error_bound_m(std::int32_t zoom) const;
+  // The method's parameters with g_e. REQUIRES: 0 <= zoom <= max_zoom.
+  ParameterValues parameters_at(std::int32_t zoom) const;
   friend bool operator==(const Recipe&, const Recipe&) = default;
 };
 
 // The names used on the command line and in files.
 std::string name_of(Resampling resampling);
 std::string name_of(Reduction reduction);
-std::string name_of(Method method);
 std::string name_of(const VoidPolicy& policy);  // "pull" or "height=H"
 Result<Resampling> resampling_named(const std::string& name);
 Result<Reduction> reduction_named(const std::string& name);
-Result<Method> method_named(const std::string& name);
 Result<VoidPolicy> void_policy_named(const std::string& name);
 
 // JSON text of an object, keys sorted; read back equal.

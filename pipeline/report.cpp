@@ -9,18 +9,20 @@ namespace qmpipe {
 namespace {
 
 nlohmann::ordered_json zoom_object(const BuiltZoom& zoom) {
-  nlohmann::ordered_json object = {{"zoom", zoom.zoom},
-                                   {"tiles", zoom.tiles},
-                                   {"vertices", zoom.vertices},
-                                   {"triangles", zoom.triangles},
-                                   {"plain_bytes", zoom.plain_bytes},
-                                   {"stored_bytes", zoom.stored_bytes},
-                                   {"tolerance_m", zoom.tolerance_m},
-                                   {"height_step_m", zoom.height_step_m},
-                                   {"valid_posts", zoom.error.posts},
-                                   {"max_error_m", zoom.error.largest_m},
-                                   {"mean_error_m", zoom.error.mean_m()},
-                                   {"rms_error_m", zoom.error.rms_m()}};
+  nlohmann::ordered_json object = {
+      {"zoom", zoom.zoom},
+      {"tiles", zoom.tiles},
+      {"vertices", zoom.vertices},
+      {"triangles", zoom.triangles},
+      {"plain_bytes", zoom.plain_bytes},
+      {"stored_bytes", zoom.stored_bytes},
+      {"tolerance_m", zoom.tolerance_m ? nlohmann::ordered_json(*zoom.tolerance_m) : nullptr},
+      {"height_step_m", zoom.height_step_m},
+      {"parameters", zoom.parameters},
+      {"valid_posts", zoom.error.posts},
+      {"max_error_m", zoom.error.largest_m},
+      {"mean_error_m", zoom.error.mean_m()},
+      {"rms_error_m", zoom.error.rms_m()}};
   for (std::size_t k = 0; k < kStageCount; ++k) {
     object["stage_s"][kStageNames[k]] = zoom.seconds[k];
   }
@@ -52,7 +54,9 @@ void BuildReport::add(const TileWork& work) {
 }
 
 std::string write_report(const BuildReport& report) {
-  nlohmann::ordered_json object = {{"tiles", report.tiles},
+  nlohmann::ordered_json object = {{"method", name_of(report.method)},
+                                   {"stop", name_of(report.stop)},
+                                   {"tiles", report.tiles},
                                    {"stored_bytes", report.stored_bytes},
                                    {"resumed_tiles", report.resumed_tiles},
                                    {"threads", report.threads},
@@ -77,10 +81,11 @@ std::string report_table(const BuildReport& report) {
                   "mean V", "mean T", "bytes", "tolerance m", "max error m", "RMS error m");
   for (const BuiltZoom& zoom : report.zooms) {
     const auto tiles = static_cast<double>(std::max<std::int64_t>(1, zoom.tiles));
-    text += fmt::format("{:>4} {:>9} {:>9.1f} {:>9.1f} {:>12} {:>12.3f} {:>12.3f} {:>12.3f}\n",
+    text += fmt::format("{:>4} {:>9} {:>9.1f} {:>9.1f} {:>12} {:>12} {:>12.3f} {:>12.3f}\n",
                         zoom.zoom, zoom.tiles, static_cast<double>(zoom.vertices) / tiles,
                         static_cast<double>(zoom.triangles) / tiles, zoom.stored_bytes,
-                        zoom.tolerance_m, zoom.error.largest_m, zoom.error.rms_m());
+                        zoom.tolerance_m ? fmt::format("{:.3f}", *zoom.tolerance_m) : "none",
+                        zoom.error.largest_m, zoom.error.rms_m());
   }
   return text;
 }

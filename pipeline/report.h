@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,9 @@ namespace qmpipe {
 
 struct BuiltZoom {
   std::int32_t zoom = 0;
-  double tolerance_m = 0;
+  std::optional<double> tolerance_m;  // where the method holds one
   double height_step_m = 0;
+  ParameterValues parameters;
   std::int64_t tiles = 0;
   std::int64_t vertices = 0;
   std::int64_t triangles = 0;
@@ -27,6 +29,8 @@ struct BuiltZoom {
 };
 
 struct BuildReport {
+  Method method = Method::kGreedy;
+  Stop stop = Stop::kTolerance;
   std::vector<BuiltZoom> zooms;
   std::int64_t tiles = 0;
   std::int64_t stored_bytes = 0;

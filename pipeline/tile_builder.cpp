@@ -29,6 +29,12 @@ BorderMask meridian_border(const PostGrid& grid, std::span<const float> heights_
   return simplify_border(grid.v_exact, line_m, tolerance_m, step_m);
 }
 
+MethodOptions tile_options(const Recipe& recipe, const TileKey& key) {
+  return method_options(recipe.method, recipe.stop, recipe.parameters_at(key.zoom),
+                        {.height_step_m = recipe.height_step_m[static_cast<std::size_t>(key.zoom)],
+                         .seed = packed(key)});
+}
+
 }  // namespace
 
 void TileBuilder::read_window(TileWork& work) const {
@@ -49,17 +55,14 @@ void TileBuilder::read_window(TileWork& work) const {
 void TileBuilder::simplify(TileWork& work, FixedBorders fixed, const PlannedTile& planned) const {
   const StageClock clock(work, Stage::kMesh);
   const auto zoom = static_cast<std::size_t>(work.key.zoom);
-  const GreedyOptions options = {.tolerance_m = recipe_.tolerance_m[zoom],
-                                 .height_step_m = recipe_.height_step_m[zoom],
-                                 .initial_grid_cells = recipe_.initial_grid_cells,
-                                 .curvature = Curvature::kCounts};
   for (const Side side : kSides) {
     if (planned.roles[index_of(side)] == SideRole::kSelf) {
-      fixed[index_of(side)] =
-          meridian_border(*work.grid, work.heights_m, options.tolerance_m, options.height_step_m);
+      fixed[index_of(side)] = meridian_border(*work.grid, work.heights_m, recipe_.tolerance_m[zoom],
+                                              recipe_.height_step_m[zoom]);
     }
   }
-  work.tin = strip_ordered(greedy_insertion(*work.grid, work.heights_m, fixed, options));
+  const MethodOptions options = tile_options(recipe_, work.key);
+  work.tin = strip_ordered(qmpipe::simplify(*work.grid, work.heights_m, fixed, options));
 }
 
 void TileBuilder::finish(TileWork& work) const {

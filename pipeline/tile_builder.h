@@ -13,7 +13,6 @@
 #include "formats/quantized_mesh.h"
 #include "pipeline/recipe.h"
 #include "scheduler/wavefront.h"
-#include "stages/greedy.h"
 #include "stages/heightfield.h"
 #include "stages/tile_error.h"
 

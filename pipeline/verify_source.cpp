@@ -31,9 +31,7 @@ class SurveyedPosts final : public SourcePosts {
     return heightfield_.window(key.zoom, Lattice::tile_window(key, 0));
   }
   std::optional<double> tolerance_m(std::int32_t zoom) const override {
-    const auto at = static_cast<std::size_t>(zoom);
-    if (at >= recipe_.tolerance_m.size()) return std::nullopt;
-    return recipe_.tolerance_m[at];
+    return recipe_.error_bound_m(zoom);
   }
   std::vector<TileKey> expected_tiles() const override {
     std::vector<TileKey> keys;

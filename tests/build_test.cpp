@@ -320,8 +320,8 @@ TEST_F(BuildTest, ContradictoryOptionsAreAllNamed) {
   BuildOptions options = options_for({"none.tif"}, "tiles");
   options.mesh.min_zoom = 5;
   options.mesh.max_zoom = 3;
-  options.mesh.root_tolerance_m = -1;
-  options.mesh.initial_grid_cells = 1000;
+  options.mesh.tolerance_at_m[4] = -1;
+  options.mesh.stop = Stop::kEdges;
   options.encode.gzip_level = 99;
   options.run.threads = 0;
   EXPECT_EQ(violated_rules(options).size(), 5U);

@@ -278,7 +278,7 @@ class StoppedRuns(ResumeTest):
 
     def test_another_parameter_is_refused_by_name(self):
         out = self.unfinished("other-parameter")
-        self.refused(out, "--tolerance", "50000", says=["--tolerance was 60000.0, and is 50000.0"])
+        self.refused(out, "--tolerance", "50000", says=['g_e (--tolerance) was "60000/2", and is "50000/2"'])
         self.refused(out, "--reduce", "max", says=["--reduce"])
         # What no tile depends on may change.
         self.finish(out, "--threads", "1", "--memory", LITTLE_MEMORY, "--checkpoint", "3")

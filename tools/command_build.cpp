@@ -12,6 +12,7 @@
 #include "formats/errors.h"
 #include "pipeline/build.h"
 #include "tools/interrupt.h"
+#include "tools/method_arguments.h"
 #include "tools/parse_values.h"
 
 namespace qmpipe {
@@ -21,12 +22,16 @@ namespace {
 struct BuildArguments {
   BuildOptions options;
   std::string scheme = "geodetic";
-  std::string method = name_of(Method::kGreedy);
+  MethodArguments method;
   std::string resampling = name_of(Resampling::kBilinear);
   std::string reduction = name_of(Reduction::kMean);
   std::string voids = "pull";
   std::string gzip = "7";
   std::string memory = "0";
+  double tolerance_m = 0;
+  bool tolerance_given = false;
+  double grid_cells = 0;
+  bool grid_given = false;
   std::string tolerances;
   std::int32_t max_zoom = -1;
   bool no_normals = false;
@@ -41,11 +46,23 @@ Value understood(const char* option, const Result<Value>& value) {
   return *value;
 }
 
+MethodChoice to_method(const BuildArguments& arguments) {
+  ShortForms short_forms;
+  if (arguments.tolerance_given) {
+    short_forms.emplace_back("g_e", ZoomSeries({arguments.tolerance_m}, 0.5));
+  }
+  if (arguments.grid_given) short_forms.emplace_back("g_g", ZoomSeries({arguments.grid_cells}));
+  return to_choice(arguments.method, short_forms);
+}
+
 BuildOptions to_options(const BuildArguments& arguments) {
   BuildOptions options = arguments.options;
   options.mesh.projection =
       arguments.scheme == "mercator" ? Projection::kMercator : Projection::kGeodetic;
-  options.mesh.method = understood("--method", method_named(arguments.method));
+  const MethodChoice method = to_method(arguments);
+  options.mesh.method = method.method;
+  options.mesh.stop = method.stop;
+  options.mesh.parameters = method.parameters;
   options.input.resampling = understood("--resampling", resampling_named(arguments.resampling));
   options.mesh.reduction = understood("--reduce", reduction_named(arguments.reduction));
   options.mesh.voids = understood("--nodata", void_policy_named(arguments.voids));
@@ -60,24 +77,24 @@ BuildOptions to_options(const BuildArguments& arguments) {
 
 void print_effective(const BuildOptions& options) {
   const MeshOptions& mesh = options.mesh;
+  const MethodChoice choice = {mesh.method, mesh.stop, mesh.parameters};
   std::string text = "effective options:\n";
   for (const std::string& path : options.input.paths) text += "  input          " + path + "\n";
   text += fmt::format(
-      "  output         {}\n  scheme         {}\n  zooms          {}..{}\n  method         {}\n"
-      "  tolerance      {} m at zoom 0, halved at each deeper zoom\n",
+      "  output         {}\n  scheme         {}\n  zooms          {}..{}\n  method         {}\n",
       options.output.path.string(),
       mesh.projection == Projection::kGeodetic ? "geodetic" : "mercator", mesh.min_zoom,
-      mesh.max_zoom ? std::to_string(*mesh.max_zoom) : "(from the pixels)", name_of(mesh.method),
-      mesh.root_tolerance_m);
+      mesh.max_zoom ? std::to_string(*mesh.max_zoom) : "(from the pixels)", text_of(choice));
+  text += effective_parameters(choice);
   for (const auto& [zoom, metres] : mesh.tolerance_at_m) {
     text += fmt::format("  tolerance-at   {}={} m\n", zoom, metres);
   }
   text += fmt::format(
-      "  grid           {} cells\n  resampling     {}\n  reduce         {}\n  nodata         {}\n"
+      "  resampling     {}\n  reduce         {}\n  nodata         {}\n"
       "  normals        {}\n  gzip           {}\n  threads        {}\n  memory         {}\n"
       "  checkpoint     {} s\n",
-      mesh.initial_grid_cells, name_of(options.input.resampling), name_of(mesh.reduction),
-      name_of(mesh.voids), options.encode.normals ? "yes" : "no",
+      name_of(options.input.resampling), name_of(mesh.reduction), name_of(mesh.voids),
+      options.encode.normals ? "yes" : "no",
       options.encode.gzip_level ? std::to_string(*options.encode.gzip_level) : "none",
       options.run.threads,
       options.run.memory_bytes == 0 ? "nine tenths of the machine's"
@@ -154,22 +171,19 @@ void add_mesh_options(CLI::App& command, BuildArguments& arguments) {
       .add_option("--max-zoom", arguments.max_zoom,
                   "Deepest zoom (default: the coarsest whose posts are no wider apart than pixels)")
       ->check(CLI::NonNegativeNumber);
-  command.add_option("--method", arguments.method, "Simplification method: greedy")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"greedy"}));
   command
-      .add_option("--tolerance", mesh.root_tolerance_m,
-                  "Largest vertical error at zoom 0 in metres; halved at each deeper zoom")
-      ->capture_default_str()
+      .add_option(
+          "--tolerance", arguments.tolerance_m,
+          "Largest vertical error at zoom 0 in metres; halved at each deeper zoom "
+          "[15000]. For greedy and for edge-collapse with --stop tolerance; with the others it "
+          "sets how fine heights are")
       ->type_name("M");
   command
       .add_option("--tolerance-at", arguments.tolerances,
                   "Zooms with a tolerance of their own: zoom=metres, separated by commas")
       ->type_name("Z=M,...");
-  command
-      .add_option("--grid", mesh.initial_grid_cells,
-                  "Cells a side of a regular grid to start from (the paper's g_g)")
-      ->capture_default_str();
+  command.add_option("--grid", arguments.grid_cells, "The same as --param g_g=N")->type_name("N");
+  add_method_options(command, arguments.method);
 }
 
 void add_output_options(CLI::App& command, BuildArguments& arguments) {
@@ -232,8 +246,11 @@ void register_build(CLI::App& app, std::function<int()>& action) {
       "A run that was stopped, killed or failed goes on where it was: give the same command "
       "again.\n"
       "Exit codes: 0 built, 1 failed, 2 wrong usage, 130 interrupted (checkpoint kept).");
-  command->callback(
-      [arguments, &action] { action = [arguments] { return run_build(*arguments); }; });
+  command->callback([arguments, command, &action] {
+    arguments->tolerance_given = command->count("--tolerance") > 0;
+    arguments->grid_given = command->count("--grid") > 0;
+    action = [arguments] { return run_build(*arguments); };
+  });
 }
 
 }  // namespace qmpipe

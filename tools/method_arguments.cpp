@@ -1,0 +1,94 @@
+#include "tools/method_arguments.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "formats/errors.h"
+
+namespace qmpipe {
+namespace {
+
+bool has_parameter(const MethodChoice& choice, const std::string& name) {
+  const auto own = parameters_of(choice.method, choice.stop);
+  return std::any_of(own.begin(), own.end(),
+                     [&name](const ParameterInfo& info) { return info.name == name; });
+}
+
+void set_by_flag(const std::string& text, MethodChoice& choice) {
+  const auto equals = text.find('=');
+  if (equals == std::string::npos) {
+    throw UsageError("--param " + text + ": give NAME=VALUE, such as g_g=10 or p_e=1024/2");
+  }
+  const std::string name = text.substr(0, equals);
+  const auto series = ZoomSeries::parse(text.substr(equals + 1));
+  if (!series) throw UsageError("--param " + text + ": " + series.error().message);
+  choice.parameters.set(name, *series);
+  if (has_parameter(choice, name)) return;
+  std::string own;
+  for (const ParameterInfo& info : parameters_of(choice.method, choice.stop)) {
+    own += (own.empty() ? "" : ", ") + std::string(info.name);
+  }
+  throw UsageError(
+      fmt::format("--param {}: {} has no such parameter, but {}", text, text_of(choice), own));
+}
+
+template <class Value>
+Value understood(const char* option, const Result<Value>& value) {
+  if (!value) throw UsageError(std::string(option) + ": " + value.error().message);
+  return *value;
+}
+
+}  // namespace
+
+void add_method_options(CLI::App& command, MethodArguments& arguments) {
+  std::string names;
+  for (const Method method : kMethods) names += (names.empty() ? "" : ", ") + name_of(method);
+  command.add_option("--method", arguments.method, "How vertices are chosen: " + names)
+      ->capture_default_str();
+  command
+      .add_option("--stop", arguments.stop,
+                  "What ends edge-collapse: tolerance (it then holds at every post) or edges (e_e)")
+      ->capture_default_str();
+  command
+      .add_option("--param", arguments.parameters,
+                  "A parameter of the method by its name in Campos et al. 2020: NAME=VALUE with a "
+                  "number; 15000/2 or 3*2 to halve or double it at each deeper zoom; or "
+                  "5000,5000,1000 for zoom 0, 1, 2 and deeper. May be given several times")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
+  command
+      .add_option("--params", arguments.parameter_file,
+                  "JSON file of parameters: {\"g_e\": \"15000/2\", \"e_e\": [5000, 1000]}")
+      ->type_name("FILE");
+}
+
+MethodChoice to_choice(const MethodArguments& arguments, const ShortForms& short_forms) {
+  MethodChoice choice;
+  choice.method = understood("--method", method_named(arguments.method));
+  choice.stop = understood("--stop", stop_named(arguments.stop));
+  if (choice.stop == Stop::kEdges && choice.method != Method::kEdgeCollapse) {
+    throw UsageError("--stop edges is for --method edge-collapse only");
+  }
+  if (!arguments.parameter_file.empty()) {
+    read_parameter_file(arguments.parameter_file, choice.parameters);
+  }
+  for (const auto& [name, series] : short_forms) choice.parameters.set(name, series);
+  for (const std::string& text : arguments.parameters) set_by_flag(text, choice);
+  return choice;
+}
+
+std::string text_of(const MethodChoice& choice) {
+  return name_of(choice.method) + (choice.stop == Stop::kEdges ? " by edges" : "");
+}
+
+std::string effective_parameters(const MethodChoice& choice) {
+  std::string text;
+  for (const ParameterInfo& info : parameters_of(choice.method, choice.stop)) {
+    text += fmt::format("  {:<14} {} ({})\n", info.name, choice.parameters.of(info.name).text(),
+                        info.meaning);
+  }
+  return text;
+}
+
+}  // namespace qmpipe
