@@ -150,14 +150,19 @@ std::unique_ptr<TileSink> open_sink(const BuildOptions& options, const RunPlace&
   return open_folder_sink(options.output.path, options.output.overwrite);
 }
 
+MemoryRequest memory_request(const BuildOptions& options) {
+  return {.limit_bytes = options.run.memory_bytes,
+          .simplify_bytes = simplify_bytes(options.mesh.method)};
+}
+
 // A zoom that an earlier run has on disk stays there, however much memory there is now.
 MemoryShare share_for(const BuildOptions& options, const SurveyOptions& survey,
                       const std::vector<RasterInfo>& sources, const RunPlace& place) {
-  std::int32_t deepest_memory_zoom = kMaxZoom;
+  MemoryRequest request = memory_request(options);
   if (place.record != nullptr && place.record->coarsest_surveyed()) {
-    deepest_memory_zoom = *place.record->coarsest_surveyed() - 1;
+    request.deepest_memory_zoom = *place.record->coarsest_surveyed() - 1;
   }
-  return share_memory(options.run.memory_bytes, survey, sources, deepest_memory_zoom);
+  return share_memory(request, survey, sources);
 }
 
 void place_store(SurveyOptions& survey, const MemoryShare& share, const BuildOptions& options,
@@ -204,6 +209,7 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
   const Heightfield heightfield(*survey.store, survey.scheme, options.mesh.voids,
                                 survey.pole_heights);
   BuildResult result;
+  result.recipe = plan.recipe;
   result.estimate = estimate_build(options, plan, heightfield, memory);
   result.estimate.store_bytes = share.store_bytes;
   progress.event(estimate_json(result.estimate));
@@ -232,7 +238,7 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   const std::vector<RasterInfo> sources = describe_inputs(to_survey);
   note_assumptions(sources, progress);
   // Refuses what cannot work before anything is made on disk.
-  share_memory(options.run.memory_bytes, to_survey, sources);
+  share_memory(memory_request(options), to_survey, sources);
   RunPlace place = open_place(options, progress);
   try {
     BuildResult result = build_in_place(options, to_survey, sources, place, progress);

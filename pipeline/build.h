@@ -15,6 +15,7 @@
 namespace qmpipe {
 
 struct BuildResult {
+  Recipe recipe;
   Estimate estimate;
   // Empty after a dry run.
   BuildReport report;

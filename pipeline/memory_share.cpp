@@ -105,11 +105,12 @@ MemoryShare choose(const std::vector<Division>& divisions, std::int64_t limit_by
 
 }  // namespace
 
-MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
-                         const std::vector<RasterInfo>& sources, std::int32_t deepest_memory_zoom) {
-  const std::int64_t limit = effective_limit(limit_bytes);
+MemoryShare share_memory(const MemoryRequest& request, const SurveyOptions& survey,
+                         const std::vector<RasterInfo>& sources) {
+  const std::int64_t limit = effective_limit(request.limit_bytes);
   const std::int32_t sampling_zoom = chosen_sampling_zoom(survey, sources);
   MemoryNeeds needs = needs_of(survey, sources, limit);
+  needs.simplify_bytes = request.simplify_bytes;
   std::vector<std::int64_t> blocks;
   for (std::int32_t zoom = 0; zoom <= sampling_zoom; ++zoom) {
     blocks.push_back(expected_blocks(survey.scheme, zoom, sources));
@@ -118,7 +119,8 @@ MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
 
   std::vector<Division> divisions;
   std::int64_t least = std::numeric_limits<std::int64_t>::max();
-  for (std::int32_t last = std::min(sampling_zoom, deepest_memory_zoom); last >= -1; --last) {
+  for (std::int32_t last = std::min(sampling_zoom, request.deepest_memory_zoom); last >= -1;
+       --last) {
     needs.lattice_bytes = lattice_memory(blocks, last);
     MemoryShare share{.plan = plan_memory(limit, needs), .last_memory_zoom = last};
     for (std::int32_t zoom = last + 1; zoom <= sampling_zoom; ++zoom) {
@@ -137,7 +139,7 @@ MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
       "--memory: this work (sampling zoom {}) needs {} MiB or more, and the limit is {} MiB{}; "
       "give more, or less input, or a smaller --max-zoom where it is deeper than the pixels",
       sampling_zoom, (least + (1LL << 20U) - 1) >> 20U, limit >> 20U,
-      limit_bytes == 0 ? " (nine tenths of this machine's memory)" : ""));
+      request.limit_bytes == 0 ? " (nine tenths of this machine's memory)" : ""));
 }
 
 }  // namespace qmpipe

@@ -19,13 +19,19 @@ struct MemoryShare {
   std::int64_t block_cache_bytes = 0;
 };
 
+struct MemoryRequest {
+  // 0: nine tenths of the machine's memory.
+  std::int64_t limit_bytes = 0;
+  // What a thread holds while it simplifies a tile (simplify_bytes() of the method).
+  std::int64_t simplify_bytes = 0;
+  // Deeper zooms go to disk even when they would fit.
+  std::int32_t deepest_memory_zoom = kMaxZoom;
+};
+
 // As many zooms as fit half the limit and leave the source its cache stay in memory, coarse ones
-// first; where no division leaves
-// enough for the work, throws UsageError with the least limit that would do.
-// `limit_bytes` 0: nine tenths of the machine's memory. Zooms deeper than `deepest_memory_zoom` go to
-// disk even when they would fit.
-MemoryShare share_memory(std::int64_t limit_bytes, const SurveyOptions& survey,
-                         const std::vector<RasterInfo>& sources,
-                         std::int32_t deepest_memory_zoom = kMaxZoom);
+// first; where no division leaves enough for the work, throws UsageError with the least limit that
+// would do.
+MemoryShare share_memory(const MemoryRequest& request, const SurveyOptions& survey,
+                         const std::vector<RasterInfo>& sources);
 
 }  // namespace qmpipe

@@ -154,6 +154,8 @@ MethodOptions method_options(Method method, Stop stop, const ParameterValues& va
   return point_set_options(method, named, frame);
 }
 
+std::int64_t simplify_bytes(Method method) { return method == Method::kGreedy ? 0 : 48LL << 20U; }
+
 namespace {
 Tin simplify_with(const PostGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
                   const GreedyOptions& options) {

@@ -104,6 +104,9 @@ using MethodOptions = std::variant<GreedyOptions, EdgeCollapseOptions, PointSetO
 MethodOptions method_options(Method method, Stop stop, const ParameterValues& values,
                              const MethodFrame& frame);
 
+// What a tile takes while it is simplified, beyond what it takes in flight (measured).
+std::int64_t simplify_bytes(Method method);
+
 Tin simplify(const PostGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
              const MethodOptions& options);
 

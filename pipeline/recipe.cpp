@@ -156,6 +156,12 @@ ParameterValues Recipe::parameters_at(std::int32_t zoom) const {
   return values;
 }
 
+MethodOptions Recipe::options_for(const TileKey& key) const {
+  return method_options(
+      method, stop, parameters_at(key.zoom),
+      {.height_step_m = height_step_m[static_cast<std::size_t>(key.zoom)], .seed = packed(key)});
+}
+
 std::string write_recipe(const Recipe& recipe) {
   const json object = {
       {"program_version", recipe.program_version},

@@ -41,6 +41,8 @@ struct Recipe {
   std::optional<double> error_bound_m(std::int32_t zoom) const;
   // The method's parameters with g_e. REQUIRES: 0 <= zoom <= max_zoom.
   ParameterValues parameters_at(std::int32_t zoom) const;
+  // What is random comes from the key. REQUIRES: the same of key.zoom.
+  MethodOptions options_for(const TileKey& key) const;
   friend bool operator==(const Recipe&, const Recipe&) = default;
 };
 

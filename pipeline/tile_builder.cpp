@@ -29,12 +29,6 @@ BorderMask meridian_border(const PostGrid& grid, std::span<const float> heights_
   return simplify_border(grid.v_exact, line_m, tolerance_m, step_m);
 }
 
-MethodOptions tile_options(const Recipe& recipe, const TileKey& key) {
-  return method_options(recipe.method, recipe.stop, recipe.parameters_at(key.zoom),
-                        {.height_step_m = recipe.height_step_m[static_cast<std::size_t>(key.zoom)],
-                         .seed = packed(key)});
-}
-
 }  // namespace
 
 void TileBuilder::read_window(TileWork& work) const {
@@ -61,7 +55,7 @@ void TileBuilder::simplify(TileWork& work, FixedBorders fixed, const PlannedTile
                                               recipe_.height_step_m[zoom]);
     }
   }
-  const MethodOptions options = tile_options(recipe_, work.key);
+  const MethodOptions options = recipe_.options_for(work.key);
   work.tin = strip_ordered(qmpipe::simplify(*work.grid, work.heights_m, fixed, options));
 }
 

@@ -285,9 +285,7 @@ void Verification::collect(TileOutcome& outcome, ZoomReport& zoom) {
   if (outcome.error.largest_m > zoom.error.largest_m) zoom.worst_tile = outcome.key;
   zoom.error.add(outcome.error);
   if (outcome.hausdorff) {
-    ++zoom.hausdorff_tiles;
-    zoom.hausdorff_sum.to_surfaces_m += outcome.hausdorff->to_surfaces_m;
-    zoom.hausdorff_sum.between_points_m += outcome.hausdorff->between_points_m;
+    zoom.measured.push_back({outcome.key, outcome.vertices, outcome.triangles, *outcome.hausdorff});
   }
 }
 
@@ -304,8 +302,14 @@ double ZoomReport::mean_triangles() const {
   return mean(static_cast<double>(triangles), readable_tiles);
 }
 HausdorffDistances ZoomReport::mean_hausdorff() const {
-  return {.to_surfaces_m = mean(hausdorff_sum.to_surfaces_m, hausdorff_tiles),
-          .between_points_m = mean(hausdorff_sum.between_points_m, hausdorff_tiles)};
+  HausdorffDistances sum;
+  for (const MeasuredTile& tile : measured) {
+    sum.to_surfaces_m += tile.hausdorff.to_surfaces_m;
+    sum.between_points_m += tile.hausdorff.between_points_m;
+  }
+  const std::int64_t count = std::ssize(measured);
+  return {.to_surfaces_m = mean(sum.to_surfaces_m, count),
+          .between_points_m = mean(sum.between_points_m, count)};
 }
 
 VerifyReport verify(const TileSet& tile_set, const VerifyOptions& options, Progress& progress) {

@@ -3,7 +3,8 @@
 //
 // Guarantees: whatever the files hold, it ends with a report. The report depends on the set and the
 // source alone, not on threads. Memory does not grow with the set beyond its keys: tiles are read
-// row by row, and of a row only its northern borders are kept for the next one.
+// row by row, and of a row only its northern borders are kept for the next one (HausdorffMode::
+// kMeasured keeps a few numbers of each).
 #pragma once
 
 #include <array>
@@ -34,6 +35,14 @@ struct VerifyOptions {
   std::int64_t most_per_kind = 20;
 };
 
+// A tile without a void post: the only ones whose distance from the source means something.
+struct MeasuredTile {
+  TileKey key;
+  std::int64_t vertices = 0;
+  std::int64_t triangles = 0;
+  HausdorffDistances hausdorff;
+};
+
 struct ZoomReport {
   std::int32_t zoom = 0;
   std::int64_t tiles = 0;
@@ -46,8 +55,7 @@ struct ZoomReport {
   ErrorSummary error;  // its `worst` is of the tile worst_tile
   std::optional<TileKey> worst_tile;
   std::optional<double> tolerance_m;
-  std::int64_t hausdorff_tiles = 0;  // those without a void post
-  HausdorffDistances hausdorff_sum;
+  std::vector<MeasuredTile> measured;  // by HausdorffMode::kMeasured; by key
 
   double mean_vertices() const;
   double mean_triangles() const;

@@ -80,9 +80,9 @@ Row row_of(const VerifyReport& report, const ZoomReport& zoom) {
   if (report.hausdorff == HausdorffMode::kMeasured) {
     const HausdorffDistances mean = zoom.mean_hausdorff();
     for (const double distance_m : {mean.to_surfaces_m, mean.between_points_m}) {
-      row.push_back(zoom.hausdorff_tiles == 0 ? "-" : fmt::format("{:.4g}", distance_m));
+      row.push_back(zoom.measured.empty() ? "-" : fmt::format("{:.4g}", distance_m));
     }
-    row.push_back(grouped(zoom.hausdorff_tiles));
+    row.push_back(grouped(static_cast<std::int64_t>(zoom.measured.size())));
   }
   return row;
 }
@@ -125,9 +125,9 @@ Json json_of_zoom(const VerifyReport& report, const ZoomReport& zoom) {
     json["tolerance_m"] = zoom.tolerance_m ? Json(*zoom.tolerance_m) : Json(nullptr);
   }
   if (report.hausdorff == HausdorffMode::kMeasured) {
-    json["hausdorff_tiles"] = zoom.hausdorff_tiles;
+    json["hausdorff_tiles"] = zoom.measured.size();
     const HausdorffDistances mean = zoom.mean_hausdorff();
-    const bool has_mean = zoom.hausdorff_tiles > 0;
+    const bool has_mean = !zoom.measured.empty();
     json["mean_hausdorff_m"] = has_mean ? Json(mean.to_surfaces_m) : Json(nullptr);
     json["mean_hausdorff_points_m"] = has_mean ? Json(mean.between_points_m) : Json(nullptr);
   }

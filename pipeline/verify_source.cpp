@@ -102,7 +102,7 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
   survey.scheme = scheme;
   survey.sampling_zoom = recipe->sampling_zoom;
   survey.max_zoom = recipe->max_zoom;
-  const MemoryShare share = share_memory(0, survey, sources);
+  const MemoryShare share = share_memory({}, survey, sources);
   std::unique_ptr<ScratchFolder> scratch;
   if (share.store_bytes > 0) {
     scratch = std::make_unique<ScratchFolder>("");

@@ -16,6 +16,19 @@ constexpr std::int32_t comfortable_in_flight(std::int32_t threads) {
   return std::max(8, 4 * threads);
 }
 
+// So many tiles, of which each thread simplifies one.
+std::int64_t tiles_bytes(const MemoryNeeds& needs, std::int64_t tiles) {
+  return tiles * kTileInFlightBytes +
+         std::min<std::int64_t>(tiles, needs.threads) * needs.simplify_bytes;
+}
+
+// The most tiles that fit the room; 0 where not one does.
+std::int64_t tiles_within(const MemoryNeeds& needs, std::int64_t room_bytes) {
+  const std::int64_t one_each = tiles_bytes(needs, needs.threads);
+  if (room_bytes < one_each) return room_bytes / (kTileInFlightBytes + needs.simplify_bytes);
+  return needs.threads + (room_bytes - one_each) / kTileInFlightBytes;
+}
+
 }  // namespace
 
 MemoryPlan plan_memory(std::int64_t limit_bytes, const MemoryNeeds& needs) {
@@ -29,7 +42,7 @@ MemoryPlan plan_memory(std::int64_t limit_bytes, const MemoryNeeds& needs) {
 
   MemoryPlan plan;
   plan.smallest_limit_bytes =
-      fixed + std::max(smallest_cache + bytes_per_sampler, kTileInFlightBytes);
+      fixed + std::max(smallest_cache + bytes_per_sampler, tiles_bytes(needs, 1));
   plan.fits = limit_bytes == 0 || limit_bytes >= plan.smallest_limit_bytes;
   plan.source_cache_bytes =
       std::max({kComfortableCacheBytes, smallest_cache, needs.source_front_bytes});
@@ -43,12 +56,12 @@ MemoryPlan plan_memory(std::int64_t limit_bytes, const MemoryNeeds& needs) {
     plan.sampling_threads = static_cast<std::int32_t>(std::clamp<std::int64_t>(
         (room_bytes - plan.source_cache_bytes) / bytes_per_sampler, 1, plan.sampling_threads));
     plan.max_in_flight = static_cast<std::int32_t>(
-        std::clamp<std::int64_t>(room_bytes / kTileInFlightBytes, 1, plan.max_in_flight));
+        std::clamp<std::int64_t>(tiles_within(needs, room_bytes), 1, plan.max_in_flight));
   }
   // Sampling and meshing follow each other, so each may use what the other has given back.
   plan.expected_peak_bytes =
       fixed + std::max(plan.source_cache_bytes + plan.sampling_threads * bytes_per_sampler,
-                       plan.max_in_flight * kTileInFlightBytes);
+                       tiles_bytes(needs, plan.max_in_flight));
   return plan;
 }
 

@@ -19,6 +19,8 @@ struct MemoryNeeds {
   std::int64_t source_front_bytes = 0;
   // What one thread's handles on the sources keep for themselves.
   std::int64_t source_handle_bytes = 0;
+  // What a thread holds while it simplifies a tile, beyond kTileInFlightBytes.
+  std::int64_t simplify_bytes = 0;
   // Per tile of the plan, for its keys, ranges and statistics.
   std::int64_t tiles = 0;
 };

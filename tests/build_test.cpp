@@ -140,13 +140,13 @@ TEST(MemoryShare, LessMemoryMovesTheDeepestZoomsToDiskFirst) {
   const SurveyOptions survey;
   std::int32_t last_before = kMaxZoom;
   for (const std::int64_t mebibytes : {8192, 2048, 1024, 512, 300}) {
-    const MemoryShare share = share_memory(mebibytes << 20U, survey, {source});
+    const MemoryShare share = share_memory({.limit_bytes = mebibytes << 20U}, survey, {source});
     EXPECT_LE(share.plan.expected_peak_bytes, mebibytes << 20U);
     EXPECT_LE(share.last_memory_zoom, last_before);
     last_before = share.last_memory_zoom;
   }
   EXPECT_LT(last_before, chosen_sampling_zoom(survey, {source}));
-  EXPECT_THROW(share_memory(50LL << 20U, survey, {source}), UsageError);
+  EXPECT_THROW(share_memory({.limit_bytes = 50LL << 20U}, survey, {source}), UsageError);
 }
 
 TEST(MemoryShare, TheLatticeGivesWayToTheStripsOfAWideSource) {
@@ -160,7 +160,7 @@ TEST(MemoryShare, TheLatticeGivesWayToTheStripsOfAWideSource) {
   source.cached_block_bytes = source.width * 2;
   SurveyOptions survey;
   survey.threads = 2;
-  const MemoryShare share = share_memory(320LL << 20U, survey, {source});
+  const MemoryShare share = share_memory({.limit_bytes = 320LL << 20U}, survey, {source});
   EXPECT_LT(share.last_memory_zoom, chosen_sampling_zoom(survey, {source}));
   EXPECT_GE(share.plan.source_cache_bytes, 260 * source.cached_block_bytes);
   EXPECT_LE(share.plan.expected_peak_bytes, 320LL << 20U);

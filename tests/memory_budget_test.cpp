@@ -19,6 +19,7 @@ MemoryNeeds random_needs(std::mt19937_64& random) {
           .source_block_bytes = below(2) == 0 ? below(100 * kMiB) : 0,
           .source_front_bytes = below(kGiB),
           .source_handle_bytes = below(kMiB),
+          .simplify_bytes = below(2) == 0 ? below(60 * kMiB) : 0,
           .tiles = below(1'000'000)};
 }
 
@@ -38,7 +39,9 @@ TEST(MemoryBudget, WhatFitsStaysBelowItsLimit) {
     ASSERT_GE(plan.source_cache_bytes, needs.source_block_bytes);
     // The peak is the sum of its parts, not a number of its own.
     const std::int64_t fixed = kProgramBytes + kGdalCacheBytes + needs.lattice_bytes;
-    ASSERT_GE(plan.expected_peak_bytes, fixed + plan.max_in_flight * kTileInFlightBytes);
+    ASSERT_GE(plan.expected_peak_bytes,
+              fixed + plan.max_in_flight * kTileInFlightBytes +
+                  std::min(plan.max_in_flight, needs.threads) * needs.simplify_bytes);
     ASSERT_GE(plan.expected_peak_bytes,
               fixed + plan.source_cache_bytes + plan.sampling_threads * kSamplingBytesPerThread);
   }

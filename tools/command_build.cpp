@@ -4,73 +4,46 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <memory>
-#include <thread>
 
-#include "formats/errors.h"
 #include "pipeline/build.h"
 #include "tools/interrupt.h"
 #include "tools/method_arguments.h"
 #include "tools/parse_values.h"
+#include "tools/pyramid_arguments.h"
 
 namespace qmpipe {
 namespace {
 
 // The words as typed, before they are understood.
 struct BuildArguments {
-  BuildOptions options;
-  std::string scheme = "geodetic";
+  PyramidArguments pyramid;
   MethodArguments method;
-  std::string resampling = name_of(Resampling::kBilinear);
-  std::string reduction = name_of(Reduction::kMean);
-  std::string voids = "pull";
+  EncodeOptions encode;
+  OutputOptions output;
+  double checkpoint_s = RunOptions().checkpoint_s;
   std::string gzip = "7";
-  std::string memory = "0";
-  double tolerance_m = 0;
-  bool tolerance_given = false;
-  double grid_cells = 0;
-  bool grid_given = false;
-  std::string tolerances;
-  std::int32_t max_zoom = -1;
   bool no_normals = false;
   bool overwrite = false;
+  bool keep_run = false;
+  bool dry_run = false;
   bool json = false;
   bool verbose = false;
 };
 
-template <class Value>
-Value understood(const char* option, const Result<Value>& value) {
-  if (!value) throw UsageError(std::string(option) + ": " + value.error().message);
-  return *value;
-}
-
-MethodChoice to_method(const BuildArguments& arguments) {
-  ShortForms short_forms;
-  if (arguments.tolerance_given) {
-    short_forms.emplace_back("g_e", ZoomSeries({arguments.tolerance_m}, 0.5));
-  }
-  if (arguments.grid_given) short_forms.emplace_back("g_g", ZoomSeries({arguments.grid_cells}));
-  return to_choice(arguments.method, short_forms);
-}
-
 BuildOptions to_options(const BuildArguments& arguments) {
-  BuildOptions options = arguments.options;
-  options.mesh.projection =
-      arguments.scheme == "mercator" ? Projection::kMercator : Projection::kGeodetic;
-  const MethodChoice method = to_method(arguments);
+  BuildOptions options = to_build_options(arguments.pyramid);
+  const MethodChoice method = to_choice(arguments.method, short_forms(arguments.pyramid));
   options.mesh.method = method.method;
   options.mesh.stop = method.stop;
   options.mesh.parameters = method.parameters;
-  options.input.resampling = understood("--resampling", resampling_named(arguments.resampling));
-  options.mesh.reduction = understood("--reduce", reduction_named(arguments.reduction));
-  options.mesh.voids = understood("--nodata", void_policy_named(arguments.voids));
-  options.mesh.tolerance_at_m = parse_tolerances(arguments.tolerances);
-  if (arguments.max_zoom >= 0) options.mesh.max_zoom = arguments.max_zoom;
   options.encode.gzip_level = parse_gzip(arguments.gzip);
   options.encode.normals = !arguments.no_normals;
-  options.run.memory_bytes = parse_size("--memory", arguments.memory);
+  options.run.checkpoint_s = arguments.checkpoint_s;
+  options.run.keep_run = arguments.keep_run;
+  options.run.dry_run = arguments.dry_run;
+  options.output = arguments.output;
   options.output.overwrite = arguments.overwrite ? Overwrite::kYes : Overwrite::kNo;
   return options;
 }
@@ -130,65 +103,9 @@ int run_build(const BuildArguments& arguments) {
   return 0;
 }
 
-void add_input_options(CLI::App& command, BuildArguments& arguments) {
-  command
-      .add_option("INPUT", arguments.options.input.paths,
-                  "Rasters of any GDAL format and CRS; where they overlap, the first that is valid "
-                  "wins")
-      ->required();
-  command
-      .add_option("--source-crs", arguments.options.input.source_crs,
-                  "CRS of the inputs, in place of their own (EPSG:32605, a .prj file, WKT)")
-      ->type_name("CRS");
-  command
-      .add_option("--resampling", arguments.resampling,
-                  "How a post is read between pixels: bilinear, cubic or nearest")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"bilinear", "cubic", "nearest"}));
-  command
-      .add_option("--reduce", arguments.reduction,
-                  "How a coarser zoom is made: mean, subsample, max (shoal-biased) or min")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"mean", "subsample", "max", "min"}));
-  command
-      .add_option(
-          "--nodata", arguments.voids,
-          "What fills voids: pull (from the coarser zooms, fading to 0 m some 64 posts from "
-          "the data) or height=H in metres")
-      ->capture_default_str();
-}
-
-void add_mesh_options(CLI::App& command, BuildArguments& arguments) {
-  MeshOptions& mesh = arguments.options.mesh;
-  command
-      .add_option("--scheme", arguments.scheme,
-                  "Tiling scheme: geodetic (EPSG:4326) or mercator (EPSG:3857)")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"geodetic", "mercator"}));
-  command.add_option("--min-zoom", mesh.min_zoom, "Coarsest zoom (above 0: a set without roots)")
-      ->capture_default_str();
-  command
-      .add_option("--max-zoom", arguments.max_zoom,
-                  "Deepest zoom (default: the coarsest whose posts are no wider apart than pixels)")
-      ->check(CLI::NonNegativeNumber);
-  command
-      .add_option(
-          "--tolerance", arguments.tolerance_m,
-          "Largest vertical error at zoom 0 in metres; halved at each deeper zoom "
-          "[15000]. For greedy and for edge-collapse with --stop tolerance; with the others it "
-          "sets how fine heights are")
-      ->type_name("M");
-  command
-      .add_option("--tolerance-at", arguments.tolerances,
-                  "Zooms with a tolerance of their own: zoom=metres, separated by commas")
-      ->type_name("Z=M,...");
-  command.add_option("--grid", arguments.grid_cells, "The same as --param g_g=N")->type_name("N");
-  add_method_options(command, arguments.method);
-}
-
 void add_output_options(CLI::App& command, BuildArguments& arguments) {
-  BuildOptions& options = arguments.options;
-  command.add_option("-o,--output", options.output.path, "Folder for the tiles")->type_name("OUT");
+  OutputOptions& output = arguments.output;
+  command.add_option("-o,--output", output.path, "Folder for the tiles")->type_name("OUT");
   command.add_flag("--overwrite", arguments.overwrite,
                    "Replace an earlier tile set in OUT; start an unfinished one over");
   command
@@ -198,30 +115,23 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
       ->capture_default_str()
       ->type_name("LEVEL|none");
   command.add_flag("--no-normals", arguments.no_normals, "Leave out the vertex normals");
-  command.add_option("--name", options.output.name, "Name in layer.json (default: OUT's)");
-  command.add_option("--description", options.output.description, "Description in layer.json");
-  command.add_option("--attribution", options.output.attribution,
+  command.add_option("--name", output.name, "Name in layer.json (default: OUT's)");
+  command.add_option("--description", output.description, "Description in layer.json");
+  command.add_option("--attribution", output.attribution,
                      "Attribution in layer.json; viewers show it");
-  command.add_option("--threads", options.run.threads, "Threads to work with (default: all cores)");
   command
-      .add_option("--memory", arguments.memory,
-                  "Most memory for the whole process, such as 512M or 2G; 0: nine tenths of the "
-                  "machine's")
-      ->capture_default_str()
-      ->type_name("SIZE");
-  command
-      .add_option("--checkpoint", options.run.checkpoint_s,
+      .add_option("--checkpoint", arguments.checkpoint_s,
                   "Seconds between two checkpoints: what a crash may cost; 0: none, an interrupted "
                   "run starts again")
       ->capture_default_str()
       ->type_name("S");
   command
-      .add_option("--run-folder", options.output.run_folder,
+      .add_option("--run-folder", output.run_folder,
                   "Folder for checkpoints and stores while the run lasts (default: OUT.qmpipe-run)")
       ->type_name("DIR");
-  command.add_flag("--keep-run", options.run.keep_run,
+  command.add_flag("--keep-run", arguments.keep_run,
                    "Leave the run folder with its stores when the tiles are done");
-  command.add_flag("--dry-run", options.run.dry_run,
+  command.add_flag("--dry-run", arguments.dry_run,
                    "Stop after the estimate: tiles, size, time, memory");
   command.add_flag("--json", arguments.json,
                    "Report as JSON on stdout, progress as JSON lines on stderr");
@@ -232,12 +142,10 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
 
 void register_build(CLI::App& app, std::function<int()>& action) {
   auto arguments = std::make_shared<BuildArguments>();
-  arguments->options.run.threads =
-      static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
   CLI::App* command = app.add_subcommand(
       "build", "Turn rasters into a quantized-mesh terrain pyramid (folder with layer.json)");
-  add_input_options(*command, *arguments);
-  add_mesh_options(*command, *arguments);
+  add_pyramid_options(*command, arguments->pyramid);
+  add_method_options(*command, arguments->method);
   add_output_options(*command, *arguments);
   command->footer(
       "Example:\n"
@@ -246,11 +154,8 @@ void register_build(CLI::App& app, std::function<int()>& action) {
       "A run that was stopped, killed or failed goes on where it was: give the same command "
       "again.\n"
       "Exit codes: 0 built, 1 failed, 2 wrong usage, 130 interrupted (checkpoint kept).");
-  command->callback([arguments, command, &action] {
-    arguments->tolerance_given = command->count("--tolerance") > 0;
-    arguments->grid_given = command->count("--grid") > 0;
-    action = [arguments] { return run_build(*arguments); };
-  });
+  command->callback(
+      [arguments, &action] { action = [arguments] { return run_build(*arguments); }; });
 }
 
 }  // namespace qmpipe

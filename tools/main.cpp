@@ -10,6 +10,7 @@
 #include "pipeline/progress.h"
 #include "pipeline/version.h"
 #include "tools/command_build.h"
+#include "tools/command_compare.h"
 #include "tools/command_info.h"
 #include "tools/command_synth.h"
 #include "tools/command_verify.h"
@@ -37,6 +38,7 @@ int run(int argc, char** argv) {
   std::function<int()> action;
   qmpipe::register_build(app, action);
   qmpipe::register_verify(app, action);
+  qmpipe::register_compare(app, action);
   qmpipe::register_info(app, action);
   qmpipe::register_synth(app, action);
   try {

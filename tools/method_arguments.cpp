@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "formats/errors.h"
+#include "tools/parse_values.h"
 
 namespace qmpipe {
 namespace {
@@ -16,14 +17,8 @@ bool has_parameter(const MethodChoice& choice, const std::string& name) {
 }
 
 void set_by_flag(const std::string& text, MethodChoice& choice) {
-  const auto equals = text.find('=');
-  if (equals == std::string::npos) {
-    throw UsageError("--param " + text + ": give NAME=VALUE, such as g_g=10 or p_e=1024/2");
-  }
-  const std::string name = text.substr(0, equals);
-  const auto series = ZoomSeries::parse(text.substr(equals + 1));
-  if (!series) throw UsageError("--param " + text + ": " + series.error().message);
-  choice.parameters.set(name, *series);
+  const auto [name, series] = parse_parameter(text);
+  choice.parameters.set(name, series);
   if (has_parameter(choice, name)) return;
   std::string own;
   for (const ParameterInfo& info : parameters_of(choice.method, choice.stop)) {
@@ -33,13 +28,16 @@ void set_by_flag(const std::string& text, MethodChoice& choice) {
       fmt::format("--param {}: {} has no such parameter, but {}", text, text_of(choice), own));
 }
 
-template <class Value>
-Value understood(const char* option, const Result<Value>& value) {
-  if (!value) throw UsageError(std::string(option) + ": " + value.error().message);
-  return *value;
-}
-
 }  // namespace
+
+std::pair<std::string, ZoomSeries> parse_parameter(const std::string& text) {
+  const auto equals = text.find('=');
+  if (equals == std::string::npos) {
+    throw UsageError("--param " + text + ": give NAME=VALUE, such as g_g=10 or p_e=1024/2");
+  }
+  return {text.substr(0, equals),
+          understood(("--param " + text).c_str(), ZoomSeries::parse(text.substr(equals + 1)))};
+}
 
 void add_method_options(CLI::App& command, MethodArguments& arguments) {
   std::string names;

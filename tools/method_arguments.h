@@ -21,6 +21,9 @@ struct MethodArguments {
 // --method, --stop, --param and --params.
 void add_method_options(CLI::App& command, MethodArguments& arguments);
 
+// "g_e=15000/2"
+std::pair<std::string, ZoomSeries> parse_parameter(const std::string& text);
+
 struct MethodChoice {
   Method method = Method::kGreedy;
   Stop stop = Stop::kTolerance;

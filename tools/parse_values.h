@@ -7,7 +7,17 @@
 #include <optional>
 #include <string>
 
+#include "formats/errors.h"
+#include "formats/result.h"
+
 namespace qmpipe {
+
+// The value, or a UsageError that names the option.
+template <class Value>
+Value understood(const char* option, const Result<Value>& value) {
+  if (!value) throw UsageError(std::string(option) + ": " + value.error().message);
+  return *value;
+}
 
 // "2G", "512M", "65536": bytes; K, M, G, T are powers of 1024, a following "B" or "iB" is allowed.
 std::int64_t parse_size(const std::string& option, const std::string& text);

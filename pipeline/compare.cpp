@@ -1,0 +1,134 @@
+#include "pipeline/compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "formats/errors.h"
+#include "formats/tile_set.h"
+#include "pipeline/verify_source.h"
+#include "stages/mesh_order.h"
+#include "stages/quantize.h"
+
+namespace qmpipe {
+namespace {
+
+constexpr int kTrialRuns = 5;
+
+ComparedMethod build_and_measure(const CompareOptions& options, const ComparedChoice& choice,
+                                 Recipe& recipe, Progress& progress) {
+  BuildOptions build = options.build;
+  build.mesh.method = choice.method;
+  build.mesh.stop = choice.stop;
+  build.output.path = options.folder / name_of(choice);
+  build.output.overwrite = Overwrite::kYes;
+  progress.note(fmt::format("{}: building", name_of(choice)));
+  BuildResult built = build_pyramid(build, progress);
+  recipe = built.recipe;
+  progress.note(fmt::format("{}: measuring", name_of(choice)));
+  const VerifyOptions verify_options = {.sources = build.input.paths,
+                                        .hausdorff = HausdorffMode::kMeasured,
+                                        .threads = build.run.threads};
+  return {.choice = choice,
+          .build = std::move(built.report),
+          .verify = verify(*open_tile_set(build.output.path), verify_options, progress),
+          .trial = std::nullopt};
+}
+
+// The most rugged tile without voids of the deepest zoom that has one; equal ones by key.
+std::optional<TileKey> choose_tile(const VerifyReport& report) {
+  for (auto zoom = report.zooms.rbegin(); zoom != report.zooms.rend(); ++zoom) {
+    const auto best = std::max_element(
+        zoom->measured.begin(), zoom->measured.end(),
+        [](const MeasuredTile& a, const MeasuredTile& b) { return a.triangles < b.triangles; });
+    if (best != zoom->measured.end()) return best->key;
+  }
+  return std::nullopt;
+}
+
+TileTrial try_tile(const Recipe& recipe, const TileKey& key, std::span<const float> heights_m) {
+  const TilingScheme scheme(recipe.projection);
+  const PostGrid grid = make_tile_grid(scheme, key);
+  const MethodOptions options = recipe.options_for(key);
+  TileTrial trial;
+  std::vector<double> seconds;
+  for (int run = 0; run < kTrialRuns; ++run) {
+    const auto start = std::chrono::steady_clock::now();
+    trial.tin = simplify(grid, heights_m, {}, options);
+    seconds.push_back(
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  std::nth_element(seconds.begin(), seconds.begin() + kTrialRuns / 2, seconds.end());
+  trial.seconds = seconds[kTrialRuns / 2];
+  trial.tin = strip_ordered(trial.tin);
+  for (const ParameterInfo& info : parameters_of(recipe.method, recipe.stop)) {
+    trial.parameters.emplace(info.name, recipe.parameters_at(key.zoom).at(info.name));
+  }
+  const QuantizedMesh mesh =
+      quantize(grid, trial.tin, recipe.height_step_m[static_cast<std::size_t>(key.zoom)]);
+  const std::vector<std::uint8_t> valid(kTilePostCount, 1);
+  trial.error = measure_error(grid, mesh, heights_m, valid);
+  trial.hausdorff = tile_hausdorff(scheme, key, mesh, heights_m);
+  return trial;
+}
+
+void try_all(const CompareOptions& options, const std::vector<Recipe>& recipes,
+             Comparison& comparison, Progress& progress) {
+  comparison.tile = choose_tile(comparison.methods.front().verify);
+  if (!comparison.tile) {
+    progress.note("no tile is free of voids: there are no distances and no single-tile trials");
+    return;
+  }
+  const SourceOptions source = {.inputs = options.build.input.paths,
+                                .source_crs = options.build.input.source_crs,
+                                .threads = options.build.run.threads};
+  const TilingScheme scheme(options.build.mesh.projection);
+  const auto posts = open_source_posts(source, scheme, recipes.front(), progress);
+  const std::optional<WindowHeights> window = posts->posts(*comparison.tile);
+  QMPIPE_CHECK(window.has_value());
+  comparison.tile_heights_m = window->heights_m;
+  for (std::size_t k = 0; k < recipes.size(); ++k) {
+    progress.check_stop();
+    comparison.methods[k].trial = try_tile(recipes[k], *comparison.tile, comparison.tile_heights_m);
+  }
+}
+
+}  // namespace
+
+std::string name_of(const ComparedChoice& choice) {
+  const std::string name = name_of(choice.method);
+  return choice.method == Method::kEdgeCollapse ? name + ":" + name_of(choice.stop) : name;
+}
+
+Result<ComparedChoice> compared_choice_named(const std::string& name) {
+  const auto colon = name.find(':');
+  const Result<Method> method = method_named(name.substr(0, colon));
+  if (!method) return method.error();
+  ComparedChoice choice{.method = *method};
+  if (colon == std::string::npos) return choice;
+  const Result<Stop> stop = stop_named(name.substr(colon + 1));
+  if (!stop) return stop.error();
+  if (choice.method != Method::kEdgeCollapse) {
+    return Error{fmt::format("\"{}\": only edge-collapse has a choice of what it stops at", name)};
+  }
+  choice.stop = *stop;
+  return choice;
+}
+
+Comparison compare_methods(const CompareOptions& options, Progress& progress) {
+  QMPIPE_CHECK(!options.methods.empty());
+  Comparison comparison;
+  comparison.inputs = options.build.input.paths;
+  comparison.projection = options.build.mesh.projection;
+  comparison.threads = options.build.run.threads;
+  std::vector<Recipe> recipes(options.methods.size());
+  for (std::size_t k = 0; k < options.methods.size(); ++k) {
+    comparison.methods.push_back(
+        build_and_measure(options, options.methods[k], recipes[k], progress));
+  }
+  try_all(options, recipes, comparison, progress);
+  return comparison;
+}
+
+}  // namespace qmpipe

@@ -1,0 +1,107 @@
+#include "tools/pyramid_arguments.h"
+
+#include <algorithm>
+#include <thread>
+
+#include "formats/errors.h"
+#include "tools/parse_values.h"
+
+namespace qmpipe {
+namespace {
+
+void add_input_options(CLI::App& command, PyramidArguments& arguments) {
+  command
+      .add_option("INPUT", arguments.options.input.paths,
+                  "Rasters of any GDAL format and CRS; where they overlap, the first that is valid "
+                  "wins")
+      ->required();
+  command
+      .add_option("--source-crs", arguments.options.input.source_crs,
+                  "CRS of the inputs, in place of their own (EPSG:32605, a .prj file, WKT)")
+      ->type_name("CRS");
+  command
+      .add_option("--resampling", arguments.resampling,
+                  "How a post is read between pixels: bilinear, cubic or nearest")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"bilinear", "cubic", "nearest"}));
+  command
+      .add_option("--reduce", arguments.reduction,
+                  "How a coarser zoom is made: mean, subsample, max (shoal-biased) or min")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"mean", "subsample", "max", "min"}));
+  command
+      .add_option(
+          "--nodata", arguments.voids,
+          "What fills voids: pull (from the coarser zooms, fading to 0 m some 64 posts from "
+          "the data) or height=H in metres")
+      ->capture_default_str();
+}
+
+void add_mesh_options(CLI::App& command, PyramidArguments& arguments) {
+  MeshOptions& mesh = arguments.options.mesh;
+  command
+      .add_option("--scheme", arguments.scheme,
+                  "Tiling scheme: geodetic (EPSG:4326) or mercator (EPSG:3857)")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"geodetic", "mercator"}));
+  command.add_option("--min-zoom", mesh.min_zoom, "Coarsest zoom (above 0: a set without roots)")
+      ->capture_default_str();
+  command
+      .add_option("--max-zoom", arguments.max_zoom,
+                  "Deepest zoom (default: the coarsest whose posts are no wider apart than pixels)")
+      ->check(CLI::NonNegativeNumber);
+  command
+      .add_option(
+          "--tolerance", arguments.tolerance_m,
+          "Largest vertical error at zoom 0 in metres; halved at each deeper zoom "
+          "[15000]. For greedy and for edge-collapse with --stop tolerance; with the others it "
+          "sets how fine heights are")
+      ->type_name("M");
+  command
+      .add_option("--tolerance-at", arguments.tolerances,
+                  "Zooms with a tolerance of their own: zoom=metres, separated by commas")
+      ->type_name("Z=M,...");
+  command.add_option("--grid", arguments.grid_cells, "The same as --param g_g=N")->type_name("N");
+}
+
+void add_machine_options(CLI::App& command, PyramidArguments& arguments) {
+  RunOptions& run = arguments.options.run;
+  run.threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
+  command.add_option("--threads", run.threads, "Threads to work with (default: all cores)");
+  command
+      .add_option("--memory", arguments.memory,
+                  "Most memory for the whole process, such as 512M or 2G; 0: nine tenths of the "
+                  "machine's")
+      ->capture_default_str()
+      ->type_name("SIZE");
+}
+
+}  // namespace
+
+void add_pyramid_options(CLI::App& command, PyramidArguments& arguments) {
+  add_input_options(command, arguments);
+  add_mesh_options(command, arguments);
+  add_machine_options(command, arguments);
+}
+
+BuildOptions to_build_options(const PyramidArguments& arguments) {
+  BuildOptions options = arguments.options;
+  options.mesh.projection =
+      arguments.scheme == "mercator" ? Projection::kMercator : Projection::kGeodetic;
+  options.input.resampling = understood("--resampling", resampling_named(arguments.resampling));
+  options.mesh.reduction = understood("--reduce", reduction_named(arguments.reduction));
+  options.mesh.voids = understood("--nodata", void_policy_named(arguments.voids));
+  options.mesh.tolerance_at_m = parse_tolerances(arguments.tolerances);
+  if (arguments.max_zoom >= 0) options.mesh.max_zoom = arguments.max_zoom;
+  options.run.memory_bytes = parse_size("--memory", arguments.memory);
+  return options;
+}
+
+ShortForms short_forms(const PyramidArguments& arguments) {
+  ShortForms forms;
+  if (arguments.tolerance_m) forms.emplace_back("g_e", ZoomSeries({*arguments.tolerance_m}, 0.5));
+  if (arguments.grid_cells) forms.emplace_back("g_g", ZoomSeries({*arguments.grid_cells}));
+  return forms;
+}
+
+}  // namespace qmpipe

@@ -1,0 +1,35 @@
+// The options of every command that builds a pyramid: what goes in, how it is tiled, how much of the
+// machine it may take.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "pipeline/build_options.h"
+#include "tools/method_arguments.h"
+
+namespace qmpipe {
+
+// The words as typed, before they are understood.
+struct PyramidArguments {
+  BuildOptions options;
+  std::string scheme = "geodetic";
+  std::string resampling = name_of(Resampling::kBilinear);
+  std::string reduction = name_of(Reduction::kMean);
+  std::string voids = "pull";
+  std::string memory = "0";
+  std::string tolerances;
+  std::int32_t max_zoom = -1;
+  // Shorter words for parameters; null until they are given.
+  std::optional<double> tolerance_m;
+  std::optional<double> grid_cells;
+};
+
+void add_pyramid_options(CLI::App& command, PyramidArguments& arguments);
+
+// All but the method, which to_choice() gives. Throws UsageError.
+BuildOptions to_build_options(const PyramidArguments& arguments);
+// --tolerance and --grid.
+ShortForms short_forms(const PyramidArguments& arguments);
+
+}  // namespace qmpipe
