@@ -153,6 +153,12 @@ Chart cost_chart(const std::vector<Rows>& all, std::size_t k) {
   return chart;
 }
 
+std::string legend(const std::vector<Rows>& all) {
+  std::string html = "<table><tr>";
+  for (const Rows& rows : all) html += method_cell(rows);
+  return html + "</tr></table>\n";
+}
+
 std::string zooms_section(const std::vector<Rows>& all) {
   std::string tables;
   std::string charts;
@@ -167,7 +173,7 @@ std::string zooms_section(const std::vector<Rows>& all) {
          "posts, from vertices and 2000 random points of each to the other's surface (the paper's "
          "Table 4). Errors are vertical, at every valid post of all tiles. The smallest distance "
          "is bold; it says nothing without the number of triangles beside it.</p>\n" +
-         tables + "<div class=\"charts\">" + charts + "</div>\n";
+         tables + legend(all) + "<div class=\"charts\">" + charts + "</div>\n";
 }
 
 std::string run_times_section(const Comparison& comparison, const std::vector<Rows>& all) {

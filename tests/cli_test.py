@@ -49,11 +49,11 @@ class Cli(unittest.TestCase):
     def test_help_names_every_command(self):
         done = run("--help")
         self.assertEqual(done.returncode, 0)
-        for command in ("build", "verify", "info", "synth"):
+        for command in ("build", "verify", "compare", "info", "synth"):
             self.assertIn(command, done.stdout)
 
     def test_each_command_has_help_with_an_example(self):
-        for command in ("build", "verify", "info", "synth"):
+        for command in ("build", "verify", "compare", "info", "synth"):
             done = run(command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("qmpipe " + command, done.stdout)
@@ -238,8 +238,63 @@ class Cli(unittest.TestCase):
 
     def test_verbose_prints_every_effective_option(self):
         done = run("build", self.dem, "-o", self.root / "v", "--dry-run", "-v")
-        for word in ("tolerance", "resampling", "reduce", "nodata", "gzip", "threads", "memory"):
+        for word in ("method", "g_e", "g_g", "resampling", "reduce", "nodata", "gzip", "threads", "memory"):
             self.assertTrue(re.search(r"^  " + word, done.stderr, re.M), word)
+
+    def test_a_method_is_chosen_with_its_parameters(self):
+        params = self.root / "params.json"
+        params.write_text('{"r_r": [90, 80], "p_e": "512/2", "e_e": 700}')
+        out = self.root / "random"
+        done = run("build", self.dem, "-o", out, "--method", "ps-random", "--params", params,
+                   "--param", "p_b=5", "-v")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for line in ("method         ps-random", "r_r            90,80", "p_e            512/2",
+                     "p_b            5"):
+            self.assertIn(line, done.stderr)
+        self.assertNotIn("e_e", done.stderr)
+        self.assertNotIn("g_g", done.stderr)
+        report = json.loads((out / "report.json").read_text())
+        self.assertEqual(report["method"], "ps-random")
+        self.assertEqual(report["zooms"][2]["parameters"]["r_r"], 80)
+        self.assertEqual(report["zooms"][2]["parameters"]["p_e"], 128)
+        self.assertIsNone(report["zooms"][2]["tolerance_m"])
+        checked = run("verify", out, "--source", self.dem)
+        self.assertEqual(checked.returncode, 0, checked.stdout)
+        # Another method in the same place is other work.
+        self.fails(1, "build", self.dem, "-o", out, "--method", "ps-grid", says=["--overwrite"])
+
+    def test_parameters_that_make_no_sense_are_refused(self):
+        build = ("build", self.dem, "-o", self.root / "no")
+        self.fails(2, *build, "--method", "wlop", says=["ps-wlop"])
+        self.fails(2, *build, "--stop", "edges", says=["edge-collapse only"])
+        self.fails(2, *build, "--param", "e_e=5", says=["greedy has no parameter e_e", "g_e, g_g"])
+        self.fails(2, *build, "--param", "g_g", says=["NAME=VALUE"])
+        self.fails(2, *build, "--param", "g_g=ten", says=["--param g_g=ten"])
+        self.fails(2, *build, "--param", "g_g=1000", says=["g_g: 1000", "0 to 256"])
+        self.fails(2, *build, "--method", "ps-grid", "--grid", "4", says=["no parameter g_g"])
+        self.fails(1, *build, "--params", self.root / "nowhere.json", says=["nowhere.json"])
+
+    def test_compare_writes_a_report(self):
+        out = self.root / "report"
+        done = run("compare", self.dem, "-o", out, "--methods", "greedy,edge-collapse:edges,ps-grid",
+                   "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        numbers = json.loads(done.stdout)
+        self.assertEqual([m["method"] for m in numbers["methods"]],
+                         ["greedy", "edge-collapse:edges", "ps-grid"])
+        self.assertEqual(sorted(p.name for p in out.iterdir()),
+                         ["compare.json", "distances.csv", "index.html", "run_times.csv",
+                          "single_tile.csv", "zooms.csv"])
+        self.fails(2, "compare", self.dem, "-o", out, says=["--overwrite"])
+        self.fails(2, "compare", self.dem, "-o", self.root / "r2", "--methods", "greedy,greedy",
+                   says=["twice"])
+        self.fails(2, "compare", self.dem, "-o", self.root / "r2", "--methods", "greed",
+                   says=["choose one of"])
+        self.fails(2, "compare", self.dem)
+        kept = run("compare", self.dem, "-o", out, "--overwrite", "--keep-tiles", "--methods",
+                   "greedy")
+        self.assertEqual(kept.returncode, 0, kept.stderr)
+        self.assertTrue((out / "tiles" / "greedy" / "layer.json").exists())
 
 
 if __name__ == "__main__":

@@ -10,22 +10,21 @@
 namespace qmpipe {
 namespace {
 
-bool has_parameter(const MethodChoice& choice, const std::string& name) {
-  const auto own = parameters_of(choice.method, choice.stop);
-  return std::any_of(own.begin(), own.end(),
-                     [&name](const ParameterInfo& info) { return info.name == name; });
+void require_parameter(const MethodChoice& choice, const std::string& name,
+                       const std::string& option) {
+  std::string own;
+  for (const ParameterInfo& info : parameters_of(choice.method, choice.stop)) {
+    if (info.name == name) return;
+    own += (own.empty() ? "" : ", ") + std::string(info.name);
+  }
+  throw UsageError(
+      fmt::format("{}: {} has no parameter {}, but {}", option, text_of(choice), name, own));
 }
 
 void set_by_flag(const std::string& text, MethodChoice& choice) {
   const auto [name, series] = parse_parameter(text);
   choice.parameters.set(name, series);
-  if (has_parameter(choice, name)) return;
-  std::string own;
-  for (const ParameterInfo& info : parameters_of(choice.method, choice.stop)) {
-    own += (own.empty() ? "" : ", ") + std::string(info.name);
-  }
-  throw UsageError(
-      fmt::format("--param {}: {} has no such parameter, but {}", text, text_of(choice), own));
+  require_parameter(choice, name, "--param " + text);
 }
 
 }  // namespace
@@ -71,7 +70,11 @@ MethodChoice to_choice(const MethodArguments& arguments, const ShortForms& short
   if (!arguments.parameter_file.empty()) {
     read_parameter_file(arguments.parameter_file, choice.parameters);
   }
-  for (const auto& [name, series] : short_forms) choice.parameters.set(name, series);
+  for (const auto& [name, series] : short_forms) {
+    choice.parameters.set(name, series);
+    // g_e sets how fine heights are, whatever the method.
+    if (name != "g_e") require_parameter(choice, name, "--grid");
+  }
   for (const std::string& text : arguments.parameters) set_by_flag(text, choice);
   return choice;
 }
