@@ -1,0 +1,198 @@
+#include "stages/collapse_surface.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scheduler/check.h"
+#include "stages/height_step.h"
+
+namespace qmpipe {
+
+CollapseSurface::CollapseSurface(const PostGrid& grid, const Tin& tin, const FixedBorders& fixed,
+                                 double height_step_m, const CollapseWeights& weights)
+    : grid_(grid),
+      weights_(weights),
+      height_step_m_(height_step_m),
+      mesh_(tin.indices, tin.vertices.size()),
+      vertices_(tin.vertices),
+      sums_(tin.vertices.size()) {
+  QMPIPE_CHECK(height_step_m > 0);
+  const auto [low, high] = std::minmax_element(
+      vertices_.begin(), vertices_.end(),
+      [](const TinVertex& a, const TinVertex& b) { return a.height_m < b.height_m; });
+  low_m_ = low->height_m;
+  high_m_ = high->height_m;
+  scale_ = {1.0 / grid.u_max(), 1.0 / grid.v_max(),
+            high_m_ > low_m_ ? 1 / (high_m_ - low_m_) : 0.0};
+  const auto bit = [](Side side) { return static_cast<std::uint8_t>(1U << index_of(side)); };
+  for (const Side side : kSides) {
+    if (fixed[index_of(side)]) fixed_sides_ |= bit(side);
+  }
+  for (const TinVertex& vertex : vertices_) {
+    std::uint8_t sides = 0;
+    if (vertex.u == 0) sides |= bit(Side::kWest);
+    if (vertex.v == 0) sides |= bit(Side::kSouth);
+    if (vertex.u == grid.u_max()) sides |= bit(Side::kEast);
+    if (vertex.v == grid.v_max()) sides |= bit(Side::kNorth);
+    sides_.push_back(sides);
+    places_.push_back(scaled(vertex));
+  }
+  for (Index v = 0; v < mesh_.vertex_count(); ++v) update_sums(v);
+}
+
+void CollapseSurface::update_sums(Index v) {
+  StarSums sums;
+  const Vector3 here = places_[at(v)];
+  mesh_.each_leaving(v, [&](Index e) {
+    const Vector3 first = places_[at(mesh_.target(e))] - here;
+    const Index back = CollapseMesh::previous(e);
+    const Vector3 second = places_[at(mesh_.origin(back))] - here;
+    sums.add_triangle(cross(first, second));
+    sums.add_neighbour(first);
+    if (mesh_.on_hull(back)) sums.add_neighbour(second);
+  });
+  sums_[at(v)] = sums;
+}
+
+EdgeQuadric CollapseSurface::quadric(Index e) const {
+  const Index a = mesh_.origin(e);
+  const Index b = mesh_.target(e);
+  const Vector3 here = places_[at(a)];
+  const Vector3 along = places_[at(b)] - here;
+  std::array<EdgeTriangle, 2> shared;
+  std::size_t count = 0;
+  for (const Index h : {e, mesh_.twin(e)}) {
+    if (h == kNone) continue;
+    const Vector3 tip = places_[at(mesh_.origin(CollapseMesh::previous(h)))] - here;
+    shared[count++] = {.normal = h == e ? cross(along, tip) : cross(tip, along), .tip = tip};
+  }
+  return EdgeQuadric(sums_[at(a)], sums_[at(b)], along, std::span(shared).first(count));
+}
+
+double CollapseSurface::boundary_cost(Index e, const Vector3& place) const {
+  double sum = 0;
+  const auto add = [&](Index h) {
+    const Vector3 from = places_[at(mesh_.origin(h))];
+    const Vector3 to = places_[at(mesh_.target(h))];
+    const Vector3 swept = cross(to - from, to - place);
+    sum += dot(swept, swept) / 4;
+  };
+  // An end on the hull has two of its edges; e itself is counted once.
+  for (const Index end : {mesh_.origin(e), mesh_.target(e)}) {
+    if (!mesh_.vertex_on_hull(end)) continue;
+    mesh_.each_leaving(end, [&](Index k) {
+      if (mesh_.on_hull(k)) add(k);
+      const Index back = CollapseMesh::previous(k);
+      if (mesh_.on_hull(back) && back != e) add(back);
+    });
+  }
+  return sum;
+}
+
+double CollapseSurface::cost_of(Index e, const EdgeQuadric& quadric,
+                                const TinVertex& vertex) const {
+  const Vector3 place = scaled(vertex);
+  const bool both_on_hull = mesh_.on_hull(e);
+  // With one end on the hull the vertex is that end, and the hull's edges sweep nothing.
+  const double boundary = both_on_hull ? boundary_cost(e, place) : 0;
+  return quadric.cost(place - places_[at(mesh_.origin(e))], boundary, weights_);
+}
+
+CollapseSurface::Candidate CollapseSurface::keeping(Index e, const EdgeQuadric& quadric,
+                                                    Index kept) const {
+  const TinVertex& vertex = vertices_[at(kept)];
+  return {.vertex = vertex, .kept = kept, .cost = cost_of(e, quadric, vertex)};
+}
+
+TinVertex CollapseSurface::rounded(const Vector3& place) const {
+  // Bounds first: a place far outside does not fit an integer.
+  const auto units = [](double scaled, std::int32_t size) {
+    return static_cast<std::int32_t>(
+        std::lround(std::clamp(scaled * size, 1.0, static_cast<double>(size - 1))));
+  };
+  const double height_m =
+      scale_.z > 0 ? std::clamp(low_m_ + place.z / scale_.z, low_m_, high_m_) : low_m_;
+  return {.u = units(place.x, grid_.u_max()),
+          .v = units(place.y, grid_.v_max()),
+          .post = kNoPost,
+          .height_m = snapped_height(height_m, height_step_m_)};
+}
+
+std::optional<CollapseSurface::Candidate> CollapseSurface::best(Index e) const {
+  const Index a = mesh_.origin(e);
+  const Index b = mesh_.target(e);
+  const std::uint8_t on_a = sides_[at(a)];
+  const std::uint8_t on_b = sides_[at(b)];
+  if (on_a != 0 && on_b != 0) {
+    // A chord through the inside would pinch the tile, and a fixed side is another tile's.
+    const bool is_fixed = (on_a & on_b & fixed_sides_) != 0;
+    if (!mesh_.on_hull(e) || is_fixed || (is_corner(a) && is_corner(b))) return std::nullopt;
+  }
+  const EdgeQuadric sums = quadric(e);
+  if (on_a == 0 && on_b == 0) {
+    const auto place = sums.best_place();
+    if (!place) return std::nullopt;
+    const TinVertex vertex = rounded(places_[at(a)] + *place);
+    for (const Index end : {a, b}) {
+      if (vertices_[at(end)].u == vertex.u && vertices_[at(end)].v == vertex.v &&
+          vertices_[at(end)].height_m == vertex.height_m) {
+        return keeping(e, sums, end);
+      }
+    }
+    return Candidate{.vertex = vertex, .kept = kNone, .cost = cost_of(e, sums, vertex)};
+  }
+  if (on_b == 0 || is_corner(a)) return keeping(e, sums, a);
+  if (on_a == 0 || is_corner(b)) return keeping(e, sums, b);
+  const Candidate keep_a = keeping(e, sums, a);
+  const Candidate keep_b = keeping(e, sums, b);
+  if (keep_a.cost == keep_b.cost) return keep_a.vertex.post < keep_b.vertex.post ? keep_a : keep_b;
+  return keep_a.cost < keep_b.cost ? keep_a : keep_b;
+}
+
+std::vector<CollapseSurface::Candidate> CollapseSurface::others(Index e) const {
+  const Index a = mesh_.origin(e);
+  const Index b = mesh_.target(e);
+  if (sides_[at(a)] != 0 || sides_[at(b)] != 0) return {};
+  const EdgeQuadric sums = quadric(e);
+  std::vector<Candidate> others = {keeping(e, sums, a), keeping(e, sums, b)};
+  const TinVertex middle = rounded(0.5 * (places_[at(a)] + places_[at(b)]));
+  others.push_back({.vertex = middle, .kept = kNone, .cost = cost_of(e, sums, middle)});
+  std::stable_sort(others.begin(), others.end(),
+                   [](const Candidate& x, const Candidate& y) { return x.cost < y.cost; });
+  return others;
+}
+
+bool CollapseSurface::fits(Index e, const Candidate& candidate) const {
+  if (!mesh_.may_collapse(e)) return false;
+  const IntPoint place = {candidate.vertex.u, candidate.vertex.v};
+  return each_new_triangle(e, candidate.kept, [&](Index x, Index y) {
+    return orientation(place, point(x), point(y)) > 0;
+  });
+}
+
+CollapseSurface::Index CollapseSurface::collapse(Index e, const Candidate& candidate) {
+  const Index v = candidate.kept == kNone ? mesh_.origin(e) : candidate.kept;
+  mesh_.collapse(e, v);
+  vertices_[at(v)] = candidate.vertex;
+  places_[at(v)] = scaled(candidate.vertex);
+  update_sums(v);
+  mesh_.each_neighbour(v, [&](Index w) { update_sums(w); });
+  return v;
+}
+
+Tin CollapseSurface::tin() const {
+  Tin tin;
+  std::vector<std::uint32_t> number(vertices_.size(), 0);
+  for (Index v = 0; v < mesh_.vertex_count(); ++v) {
+    if (!mesh_.vertex_is_alive(v)) continue;
+    number[at(v)] = static_cast<std::uint32_t>(tin.vertices.size());
+    tin.vertices.push_back(vertices_[at(v)]);
+  }
+  tin.indices.reserve(3 * static_cast<std::size_t>(mesh_.triangle_count()));
+  for (Index e = 0; e < mesh_.half_edge_count(); ++e) {
+    if (mesh_.is_alive(e)) tin.indices.push_back(number[at(mesh_.origin(e))]);
+  }
+  return tin;
+}
+
+}  // namespace qmpipe
