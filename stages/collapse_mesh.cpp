@@ -7,46 +7,43 @@
 namespace qmpipe {
 
 CollapseMesh::CollapseMesh(std::span<const std::uint32_t> indices, std::size_t vertex_count)
-    : origin_(indices.size()),
-      twin_(indices.size(), kNone),
-      out_(vertex_count, kNone),
-      mark_(vertex_count, 0) {
+    : half_edges_(indices.size()), out_(vertex_count, kNone), mark_(vertex_count, 0) {
   QMPIPE_CHECK(indices.size() % 3 == 0 && !indices.empty());
-  // Twins are found by sorting: (lower end, higher end, half-edge).
-  struct Ends {
-    std::uint64_t key = 0;
-    Index half_edge = kNone;
-  };
-  std::vector<Ends> ends(indices.size());
   for (Index e = 0; e < half_edge_count(); ++e) {
-    const std::uint64_t from = indices[at(e)];
-    const std::uint64_t to = indices[at(next(e))];
-    QMPIPE_CHECK(from < vertex_count && from != to);
-    origin_[at(e)] = static_cast<Index>(from);
-    out_[at(origin(e))] = e;
-    ends[at(e)] = {std::min(from, to) << 32U | std::max(from, to), e};
+    QMPIPE_CHECK(indices[at(e)] < vertex_count);
+    half_edges_[at(e)].origin = static_cast<Index>(indices[at(e)]);
   }
-  std::stable_sort(ends.begin(), ends.end(),
-                   [](const Ends& a, const Ends& b) { return a.key < b.key; });
-  edge_count_ = static_cast<std::int64_t>(ends.size());
-  for (std::size_t k = 1; k < ends.size(); ++k) {
-    if (ends[k].key != ends[k - 1].key) continue;
-    const Index e = ends[k].half_edge;
-    QMPIPE_CHECK(origin(e) != origin(ends[k - 1].half_edge));
-    link(e, ends[k - 1].half_edge);
-    --edge_count_;
-  }
+  find_twins();
   for (Index e = 0; e < half_edge_count(); ++e) {
-    if (on_hull(e)) out_[at(origin(e))] = e;
+    Index& out = out_[at(origin(e))];
+    if (out == kNone || on_hull(e)) out = e;
   }
   triangle_count_ = half_edge_count() / 3;
   QMPIPE_CHECK(std::find(out_.begin(), out_.end(), kNone) == out_.end());
+  // Euler's formula.
   QMPIPE_CHECK(static_cast<std::int64_t>(vertex_count) - edge_count_ + triangle_count_ == 1);
 }
 
+void CollapseMesh::find_twins() {
+  // The half-edges that leave a vertex as a list: the last one found, and the one before each.
+  std::vector<Index> last(out_.size(), kNone);
+  std::vector<Index> before(half_edges_.size(), kNone);
+  edge_count_ = half_edge_count();
+  for (Index e = 0; e < half_edge_count(); ++e) {
+    for (Index f = last[at(target(e))]; f != kNone; f = before[at(f)]) {
+      if (target(f) != origin(e)) continue;
+      QMPIPE_CHECK(on_hull(e) && on_hull(f));
+      link(e, f);
+      --edge_count_;
+    }
+    before[at(e)] = last[at(origin(e))];
+    last[at(origin(e))] = e;
+  }
+}
+
 void CollapseMesh::link(Index e, Index f) {
-  if (e != kNone) twin_[at(e)] = f;
-  if (f != kNone) twin_[at(f)] = e;
+  if (e != kNone) half_edges_[at(e)].twin = f;
+  if (f != kNone) half_edges_[at(f)].twin = e;
 }
 
 bool CollapseMesh::may_collapse(Index e) const {
@@ -70,10 +67,7 @@ void CollapseMesh::close(Index e) {
   if (out_[at(tip)] == previous(e)) out_[at(tip)] = right;
   link(right, left);
   const Index first = e - e % 3;
-  for (Index k = first; k < first + 3; ++k) {
-    origin_[at(k)] = kNone;
-    twin_[at(k)] = kNone;
-  }
+  for (Index k = first; k < first + 3; ++k) half_edges_[at(k)] = {};
   --triangle_count_;
 }
 
@@ -99,7 +93,7 @@ void CollapseMesh::collapse(Index e, Index kept) {
   } else {
     out = twin(previous(e));
   }
-  each_leaving(removed, [&](Index k) { origin_[at(k)] = kept; });
+  each_leaving(removed, [&](Index k) { half_edges_[at(k)].origin = kept; });
   out_[at(removed)] = kNone;
   close(e);
   if (f != kNone) close(f);

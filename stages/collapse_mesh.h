@@ -28,15 +28,15 @@ class CollapseMesh {
   static Index next(Index e) { return e % 3 == 2 ? e - 2 : e + 1; }
   static Index previous(Index e) { return e % 3 == 0 ? e + 2 : e - 1; }
 
-  Index half_edge_count() const { return static_cast<Index>(origin_.size()); }
+  Index half_edge_count() const { return static_cast<Index>(half_edges_.size()); }
   Index vertex_count() const { return static_cast<Index>(out_.size()); }
   std::int64_t edge_count() const { return edge_count_; }
   std::int64_t triangle_count() const { return triangle_count_; }
 
   // Of a half-edge; kNone for a dead one.
-  Index origin(Index e) const { return origin_[at(e)]; }
-  Index target(Index e) const { return origin_[at(next(e))]; }
-  Index twin(Index e) const { return twin_[at(e)]; }
+  Index origin(Index e) const { return half_edges_[at(e)].origin; }
+  Index target(Index e) const { return origin(next(e)); }
+  Index twin(Index e) const { return half_edges_[at(e)].twin; }
   Index edge(Index e) const { return twin(e) != kNone && twin(e) < e ? twin(e) : e; }
   bool is_alive(Index e) const { return origin(e) != kNone; }
   bool on_hull(Index e) const { return twin(e) == kNone; }
@@ -66,6 +66,15 @@ class CollapseMesh {
     if (on_hull(last)) each(origin(last));
   }
 
+  // Calls each(edge) for the edges at v.
+  template <class Each>
+  void each_edge(Index v, const Each& each) const {
+    each_leaving(v, [&](Index e) {
+      each(edge(e));
+      if (on_hull(previous(e))) each(previous(e));
+    });
+  }
+
   // Whether a disk stays when the edge becomes a vertex: its ends have no neighbours in common but
   // those across its triangles, and when both lie on the hull, so does it.
   bool may_collapse(Index e) const;
@@ -75,14 +84,19 @@ class CollapseMesh {
 
  private:
   static std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+  void find_twins();
   // Takes triangle e / 3 out and joins what its other two edges bordered on.
   void close(Index e);
   void link(Index e, Index f);
   // What leaves the same vertex as e once close() has taken the triangles of `edge` out.
   Index after_closing(Index e, Index edge) const;
 
-  std::vector<Index> origin_;
-  std::vector<Index> twin_;
+  // Side by side, because walks need both.
+  struct HalfEdge {
+    Index origin = kNone;
+    Index twin = kNone;
+  };
+  std::vector<HalfEdge> half_edges_;
   std::vector<Index> out_;  // a half-edge that leaves each vertex: on the hull the one along it
   std::int64_t edge_count_ = 0;
   std::int64_t triangle_count_ = 0;

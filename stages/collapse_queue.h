@@ -23,7 +23,8 @@ class CollapseQueue {
   };
 
   // For edges 0..edge_limit - 1.
-  explicit CollapseQueue(Index edge_limit) : place_(static_cast<std::size_t>(edge_limit), kOutside) {
+  explicit CollapseQueue(Index edge_limit = 0)
+      : place_(static_cast<std::size_t>(edge_limit), kOutside) {
     heap_.reserve(static_cast<std::size_t>(edge_limit) / 2 + 1);
   }
 

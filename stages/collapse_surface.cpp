@@ -10,7 +10,7 @@ namespace qmpipe {
 
 CollapseSurface::CollapseSurface(const PostGrid& grid, const Tin& tin, const FixedBorders& fixed,
                                  double height_step_m, const CollapseWeights& weights)
-    : grid_(grid),
+    : grid_(&grid),
       weights_(weights),
       height_step_m_(height_step_m),
       mesh_(tin.indices, tin.vertices.size()),
@@ -89,19 +89,17 @@ double CollapseSurface::boundary_cost(Index e, const Vector3& place) const {
   return sum;
 }
 
-double CollapseSurface::cost_of(Index e, const EdgeQuadric& quadric,
-                                const TinVertex& vertex) const {
-  const Vector3 place = scaled(vertex);
+double CollapseSurface::cost_of(Index e, const EdgeQuadric& quadric, const Vector3& place) const {
   const bool both_on_hull = mesh_.on_hull(e);
   // With one end on the hull the vertex is that end, and the hull's edges sweep nothing.
   const double boundary = both_on_hull ? boundary_cost(e, place) : 0;
   return quadric.cost(place - places_[at(mesh_.origin(e))], boundary, weights_);
 }
 
-CollapseSurface::Candidate CollapseSurface::keeping(Index e, const EdgeQuadric& quadric,
-                                                    Index kept) const {
-  const TinVertex& vertex = vertices_[at(kept)];
-  return {.vertex = vertex, .kept = kept, .cost = cost_of(e, quadric, vertex)};
+CollapseSurface::Plan CollapseSurface::keeping(Index e, const EdgeQuadric& quadric,
+                                               Index kept) const {
+  const Vector3& place = places_[at(kept)];
+  return {.place = place, .kept = kept, .cost = cost_of(e, quadric, place)};
 }
 
 TinVertex CollapseSurface::rounded(const Vector3& place) const {
@@ -112,13 +110,13 @@ TinVertex CollapseSurface::rounded(const Vector3& place) const {
   };
   const double height_m =
       scale_.z > 0 ? std::clamp(low_m_ + place.z / scale_.z, low_m_, high_m_) : low_m_;
-  return {.u = units(place.x, grid_.u_max()),
-          .v = units(place.y, grid_.v_max()),
+  return {.u = units(place.x, grid_->u_max()),
+          .v = units(place.y, grid_->v_max()),
           .post = kNoPost,
           .height_m = snapped_height(height_m, height_step_m_)};
 }
 
-std::optional<CollapseSurface::Candidate> CollapseSurface::best(Index e) const {
+std::optional<CollapseSurface::Plan> CollapseSurface::plan(Index e) const {
   const Index a = mesh_.origin(e);
   const Index b = mesh_.target(e);
   const std::uint8_t on_a = sides_[at(a)];
@@ -130,23 +128,39 @@ std::optional<CollapseSurface::Candidate> CollapseSurface::best(Index e) const {
   }
   const EdgeQuadric sums = quadric(e);
   if (on_a == 0 && on_b == 0) {
-    const auto place = sums.best_place();
-    if (!place) return std::nullopt;
-    const TinVertex vertex = rounded(places_[at(a)] + *place);
-    for (const Index end : {a, b}) {
-      if (vertices_[at(end)].u == vertex.u && vertices_[at(end)].v == vertex.v &&
-          vertices_[at(end)].height_m == vertex.height_m) {
-        return keeping(e, sums, end);
-      }
-    }
-    return Candidate{.vertex = vertex, .kept = kNone, .cost = cost_of(e, sums, vertex)};
+    const auto offset = sums.best_place();
+    if (!offset) return std::nullopt;
+    const Vector3 place = places_[at(a)] + *offset;
+    return Plan{.place = place, .kept = kNone, .cost = cost_of(e, sums, place)};
   }
   if (on_b == 0 || is_corner(a)) return keeping(e, sums, a);
   if (on_a == 0 || is_corner(b)) return keeping(e, sums, b);
-  const Candidate keep_a = keeping(e, sums, a);
-  const Candidate keep_b = keeping(e, sums, b);
-  if (keep_a.cost == keep_b.cost) return keep_a.vertex.post < keep_b.vertex.post ? keep_a : keep_b;
-  return keep_a.cost < keep_b.cost ? keep_a : keep_b;
+  const Plan keep_a = keeping(e, sums, a);
+  const Plan keep_b = keeping(e, sums, b);
+  if (keep_a.cost != keep_b.cost) return keep_a.cost < keep_b.cost ? keep_a : keep_b;
+  return vertices_[at(a)].post < vertices_[at(b)].post ? keep_a : keep_b;
+}
+
+CollapseSurface::Candidate CollapseSurface::candidate(Index e, const Plan& plan) const {
+  if (plan.kept != kNone) return {vertices_[at(plan.kept)], plan.kept, plan.cost};
+  const TinVertex vertex = rounded(plan.place);
+  for (const Index end : {mesh_.origin(e), mesh_.target(e)}) {
+    const TinVertex& old = vertices_[at(end)];
+    if (old.u == vertex.u && old.v == vertex.v && old.height_m == vertex.height_m) {
+      return {old, end, plan.cost};
+    }
+  }
+  return {vertex, kNone, plan.cost};
+}
+
+std::optional<double> CollapseSurface::cost(Index e) const {
+  const auto place = plan(e);
+  return place ? std::optional(place->cost) : std::nullopt;
+}
+
+std::optional<CollapseSurface::Candidate> CollapseSurface::best(Index e) const {
+  const auto place = plan(e);
+  return place ? std::optional(candidate(e, *place)) : std::nullopt;
 }
 
 std::vector<CollapseSurface::Candidate> CollapseSurface::others(Index e) const {
@@ -154,9 +168,10 @@ std::vector<CollapseSurface::Candidate> CollapseSurface::others(Index e) const {
   const Index b = mesh_.target(e);
   if (sides_[at(a)] != 0 || sides_[at(b)] != 0) return {};
   const EdgeQuadric sums = quadric(e);
-  std::vector<Candidate> others = {keeping(e, sums, a), keeping(e, sums, b)};
-  const TinVertex middle = rounded(0.5 * (places_[at(a)] + places_[at(b)]));
-  others.push_back({.vertex = middle, .kept = kNone, .cost = cost_of(e, sums, middle)});
+  const Vector3 middle = 0.5 * (places_[at(a)] + places_[at(b)]);
+  std::vector<Candidate> others = {
+      candidate(e, keeping(e, sums, a)), candidate(e, keeping(e, sums, b)),
+      candidate(e, {.place = middle, .kept = kNone, .cost = cost_of(e, sums, middle)})};
   std::stable_sort(others.begin(), others.end(),
                    [](const Candidate& x, const Candidate& y) { return x.cost < y.cost; });
   return others;

@@ -23,7 +23,8 @@ class CollapseSurface {
   using Index = CollapseMesh::Index;
   static constexpr Index kNone = CollapseMesh::kNone;
 
-  // The vertex that an edge may become. `kept`: the end that stays as it is, kNone when both go.
+  // The vertex that an edge may become. `kept`: the end that stays as it is, kNone when both go. The
+  // cost is that of the place before rounding.
   struct Candidate {
     TinVertex vertex;
     Index kept = kNone;
@@ -37,8 +38,10 @@ class CollapseSurface {
   const CollapseMesh& mesh() const { return mesh_; }
   const TinVertex& vertex(Index v) const { return vertices_[at(v)]; }
 
-  // What the rules make of an edge; none when it is never to be collapsed as things stand.
+  // What the rules make of an edge; none when they forbid it.
   std::optional<Candidate> best(Index e) const;
+  // Its cost alone, which is quicker.
+  std::optional<double> cost(Index e) const;
   // Other vertices for an edge whose best one does not do, cheapest first. None where the rules leave
   // no choice.
   std::vector<Candidate> others(Index e) const;
@@ -65,11 +68,19 @@ class CollapseSurface {
   void update_sums(Index v);
   EdgeQuadric quadric(Index e) const;
   double boundary_cost(Index e, const Vector3& place) const;
-  double cost_of(Index e, const EdgeQuadric& quadric, const TinVertex& vertex) const;
-  Candidate keeping(Index e, const EdgeQuadric& quadric, Index kept) const;
+  double cost_of(Index e, const EdgeQuadric& quadric, const Vector3& place) const;
+  // Where the rules put the vertex, before rounding.
+  struct Plan {
+    Vector3 place;
+    Index kept = kNone;
+    double cost = 0;
+  };
+  std::optional<Plan> plan(Index e) const;
+  Plan keeping(Index e, const EdgeQuadric& quadric, Index kept) const;
+  Candidate candidate(Index e, const Plan& plan) const;
   TinVertex rounded(const Vector3& place) const;
 
-  const PostGrid& grid_;
+  const PostGrid* grid_;
   CollapseWeights weights_;
   double height_step_m_;
   double low_m_ = 0;

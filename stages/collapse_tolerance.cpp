@@ -30,7 +30,8 @@ CollapseTolerance::Rows CollapseTolerance::rows_of(const TinVertex& vertex) cons
   if (vertex.post != kNoPost) return {grid_.row(vertex.post), grid_.row(vertex.post)};
   const auto above = std::lower_bound(grid_.v.begin(), grid_.v.end(), vertex.v);
   const auto row = static_cast<std::int32_t>(above - grid_.v.begin());
-  return {std::max(0, row - 1), std::min(grid_.height_posts - 1, *above == vertex.v ? row + 1 : row)};
+  return {std::max(0, row - 1),
+          std::min(grid_.height_posts - 1, *above == vertex.v ? row + 1 : row)};
 }
 
 PostErrors::Corner CollapseTolerance::corner(const TinVertex& vertex) const {
@@ -50,8 +51,7 @@ bool CollapseTolerance::holds(const std::array<const TinVertex*, 3>& triangle) {
   const Worst worst = errors_.worst_post(corners, j_first, j_last);
   if (worst.error <= errors_.threshold_m()) return true;
   if (blocked_[at(worst.post)] == 0) return false;
-  return errors_.worst_free_post(corners, j_first, j_last, blocked_).error <=
-         errors_.threshold_m();
+  return errors_.worst_free_post(corners, j_first, j_last, blocked_).error <= errors_.threshold_m();
 }
 
 // The error of a decoded tile (tile_error.h) is taken at the vertex where one stands at a post.
@@ -61,7 +61,8 @@ bool CollapseTolerance::agrees_with_its_post(const TinVertex& vertex) const {
   if (*column != vertex.u || *row != vertex.v) return true;
   const std::int32_t post = grid_.index(static_cast<std::int32_t>(column - grid_.u.begin()),
                                         static_cast<std::int32_t>(row - grid_.v.begin()));
-  return std::abs(vertex.height_m - errors_.base_m() - static_cast<double>(errors_.height_m(post))) <=
+  return std::abs(vertex.height_m - errors_.base_m() -
+                  static_cast<double>(errors_.height_m(post))) <=
          static_cast<double>(errors_.threshold_m());
 }
 

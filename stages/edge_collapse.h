@@ -24,7 +24,7 @@ struct EdgeCollapseOptions {
   double height_step_m = 0;
   // Keeps every post within this of the surface; none: least_edges alone decides.
   // REQUIRES: > height_step_m / 2.
-  std::optional<double> tolerance_m;
+  std::optional<double> tolerance_m = std::nullopt;
   Curvature curvature = Curvature::kCounts;
   // The paper's e_e: stops when the TIN has fewer edges than this; 0: not by number.
   std::int64_t least_edges = 0;

@@ -16,16 +16,16 @@ class Constraints {
     if (complete() || !(squared > 0) || !std::isfinite(squared)) return;
     if (count_ == 1) {
       const double along = dot(normals_[0], normal);
-      if (along * along > squared * kSquaredCosine) return;
+      if (along * along > squares_[0] * squared * kSquaredCosine) return;
     }
     if (count_ == 2) {
       const Vector3 line = cross(normals_[0], normals_[1]);
       const double along = dot(line, normal);
       if (along * along <= dot(line, line) * squared * kSquaredSine) return;
     }
-    const double scale = 1 / std::sqrt(squared);
-    normals_[count_] = scale * normal;
-    offsets_[count_] = scale * offset;
+    normals_[count_] = normal;
+    offsets_[count_] = offset;
+    squares_[count_] = squared;
     ++count_;
   }
 
@@ -61,18 +61,19 @@ class Constraints {
   static constexpr double kSquaredCosine = 0.99969541350954788;  // of one degree
   static constexpr double kSquaredSine = 0.00030458649045211894;
 
-  // A direction in the plane, found by dividing by the largest component.
+  // A direction in the plane: across the axis that the normal is nearest to.
   static Vector3 across(const Vector3& n) {
     const double x = std::abs(n.x);
     const double y = std::abs(n.y);
     const double z = std::abs(n.z);
-    if (z > x && z > y) return {1, 0, -n.x / n.z};
-    if (y > x) return {0, -n.z / n.y, 1};
-    return {-n.z / n.x, 0, 1};
+    if (z > x && z > y) return {n.z, 0, -n.x};
+    if (y > x) return {0, -n.z, n.y};
+    return {-n.z, 0, n.x};
   }
 
   Vector3 normals_[3];
   double offsets_[3] = {0, 0, 0};
+  double squares_[3] = {0, 0, 0};  // of the normals' lengths
   int count_ = 0;
 };
 
@@ -115,9 +116,9 @@ std::optional<Vector3> EdgeQuadric::best_place() const {
 
 double EdgeQuadric::cost(const Vector3& place, double boundary,
                          const CollapseWeights& weights) const {
-  const double volume = (dot(place, planes_.times(place)) - 2 * dot(place, slope_) + constant_) / 36;
-  const double shape =
-      link_size_ * dot(place, place) - 2 * dot(place, link_) + link_squares_;
+  const double volume =
+      (dot(place, planes_.times(place)) - 2 * dot(place, slope_) + constant_) / 36;
+  const double shape = link_size_ * dot(place, place) - 2 * dot(place, link_) + link_squares_;
   return weights.volume * (volume > 0 ? volume : 0) +
          squared_length_ * (weights.boundary * boundary + weights.shape * squared_length_ * shape);
 }

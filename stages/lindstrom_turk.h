@@ -117,12 +117,12 @@ class EdgeQuadric {
 
  private:
   double squared_length_ = 0;
-  Vector3 normals_;         // volume: normals_ * x = volume_ keeps it
+  Vector3 normals_;  // volume: normals_ * x = volume_ keeps it
   double volume_ = 0;
-  Symmetric3 planes_;       // volume lost, squared: x' planes_ x - 2 slope_ * x + constant_
+  Symmetric3 planes_;  // volume lost, squared: x' planes_ x - 2 slope_ * x + constant_
   Vector3 slope_;
   double constant_ = 0;
-  Vector3 link_;            // over the vertices around: sum of places, of their squares, number
+  Vector3 link_;  // over the vertices around: sum of places, of their squares, number
   double link_squares_ = 0;
   double link_size_ = 0;
 };
