@@ -39,6 +39,34 @@ SinCos sin_cos_deg(double angle_deg) {
   return {std::sin(angle_deg * kRadPerDeg), std::cos(angle_deg * kRadPerDeg)};
 }
 
+// The latitude and height of a point, from its distance to the axis and its z.
+struct Vertical {
+  SinCos latitude;
+  double height_m;
+};
+
+// B. R. Bowring, "Transformation from spatial to geographical coordinates" (1976): Newton's method
+// for the reduced latitude, of which the third step changes no digit.
+Vertical vertical_through(double axis_m, double z_m) {
+  constexpr double kRatio = kPolarRadiusM / kEquatorialRadiusM;
+  constexpr double kE2 = 1 - kRatio * kRatio;
+  const auto direction = [](double sin_part, double cos_part) {
+    const double n = std::sqrt(sin_part * sin_part + cos_part * cos_part);
+    return n > 0 ? SinCos{sin_part / n, cos_part / n} : SinCos{0, 1};
+  };
+  SinCos reduced = direction(z_m, kRatio * axis_m);
+  SinCos latitude{};
+  for (int step = 0; step < 3; ++step) {
+    latitude =
+        direction(z_m + kE2 / kRatio * kEquatorialRadiusM * reduced.sin * reduced.sin * reduced.sin,
+                  axis_m - kE2 * kEquatorialRadiusM * reduced.cos * reduced.cos * reduced.cos);
+    reduced = direction(kRatio * latitude.sin, latitude.cos);
+  }
+  const double foot = std::sqrt(1 - kE2 * latitude.sin * latitude.sin);
+  return {.latitude = latitude,
+          .height_m = axis_m * latitude.cos + z_m * latitude.sin - kEquatorialRadiusM * foot};
+}
+
 const Vec3& farthest_from(const Vec3& centre, std::span<const Vec3> points) {
   const Vec3* farthest = &points.front();
   double largest = -1;
@@ -125,6 +153,23 @@ Vec3 to_ecef(const GeoPoint& point) {
   const double gamma = std::sqrt(kA2 * (up[0] * up[0] + up[1] * up[1]) + kB2 * up[2] * up[2]);
   return {(kA2 / gamma + point.height_m) * up[0], (kA2 / gamma + point.height_m) * up[1],
           (kB2 / gamma + point.height_m) * up[2]};
+}
+
+GeoPoint to_geodetic(const Vec3& point_ecef) {
+  const auto& [x, y, z] = point_ecef;
+  const Vertical vertical = vertical_through(std::sqrt(x * x + y * y), z);
+  return {.longitude_deg = std::atan2(y, x) / kRadPerDeg,
+          .latitude_deg = std::atan2(vertical.latitude.sin, vertical.latitude.cos) / kRadPerDeg,
+          .height_m = vertical.height_m};
+}
+
+Vec3 moved_to_height(const Vec3& point_ecef, double height_m) {
+  const auto& [x, y, z] = point_ecef;
+  const double axis_m = std::sqrt(x * x + y * y);
+  const Vertical vertical = vertical_through(axis_m, z);
+  const double up_m = height_m - vertical.height_m;
+  const double outwards = axis_m > 0 ? 1 + up_m * vertical.latitude.cos / axis_m : 1;
+  return {x * outwards, y * outwards, z + up_m * vertical.latitude.sin};
 }
 
 Sphere bounding_sphere(std::span<const Vec3> points_ecef) {

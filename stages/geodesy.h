@@ -20,6 +20,11 @@ struct GeoPoint {
 };
 
 Vec3 to_ecef(const GeoPoint& point);
+// The inverse, for points less than 1000 km above or below the ellipsoid: good to 1e-9 m and, off
+// the poles, where a meridian is as good as any other, to 1e-9 m of longitude.
+GeoPoint to_geodetic(const Vec3& point_ecef);
+// The point on the same vertical at this ellipsoidal height. Same bounds as to_geodetic().
+Vec3 moved_to_height(const Vec3& point_ecef, double height_m);
 // Unit vector that points straight up from the ellipsoid.
 Vec3 up_at(double longitude_deg, double latitude_deg);
 

@@ -70,6 +70,43 @@ TEST(Ecef, RoundTripsAndUpIsUp) {
   }
 }
 
+TEST(Geodetic, IsTheInverseOfEcefEverywhere) {
+  for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    const double reach_m = seed % 3 == 0 ? 900e3 : 9e3;
+    const GeoPoint point = {uniform(random, -180, 180), uniform(random, -90, 90),
+                            uniform(random, -reach_m, reach_m)};
+    const GeoPoint back = to_geodetic(to_ecef(point));
+    EXPECT_NEAR(back.latitude_deg, point.latitude_deg, 2e-14 * 90);
+    EXPECT_NEAR(back.height_m, point.height_m, 4e-9);
+    EXPECT_LT(length(minus(to_ecef(back), to_ecef(point))), 5e-9);
+  }
+}
+
+TEST(Geodetic, HoldsAtThePolesAndOnTheAntimeridian) {
+  for (const double latitude_deg : {-90.0, 90.0}) {
+    const GeoPoint pole = to_geodetic(to_ecef({77, latitude_deg, 1234.5}));
+    EXPECT_EQ(pole.latitude_deg, latitude_deg);
+    EXPECT_NEAR(pole.height_m, 1234.5, 2e-9);
+  }
+  EXPECT_EQ(to_geodetic(to_ecef({180, 0, 0})).longitude_deg, 180);
+  EXPECT_EQ(to_geodetic(to_ecef({-90, 0, 0})).longitude_deg, -90);
+}
+
+TEST(Geodetic, APointMovesAlongItsVerticalToAHeight) {
+  for (std::uint64_t seed = 1; seed <= 500; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    const double latitude_deg = seed % 10 == 0 ? 90 : uniform(random, -90, 90);
+    const GeoPoint point = {uniform(random, -180, 180), latitude_deg, uniform(random, -1e5, 1e4)};
+    GeoPoint other = point;
+    other.height_m = uniform(random, -9e3, 9e3);
+    const Vec3 moved = moved_to_height(to_ecef(point), other.height_m);
+    EXPECT_LT(length(minus(moved, to_ecef(other))), 5e-9);
+  }
+}
+
 void expect_good_sphere(const std::vector<Vec3>& points, double optimal_m) {
   const Sphere sphere = bounding_sphere(points);
   for (const Vec3& p : points) ASSERT_LE(length(minus(p, sphere.centre)), sphere.radius_m);
