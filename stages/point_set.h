@@ -4,10 +4,12 @@
 //
 // Guarantees: the TIN covers the grid's rectangle, every triangle counter-clockwise in (u, v); corners
 // stay; on a fixed side exactly the given posts are vertices; vertices on the sides are posts with
-// their own heights; on a free side no edge is longer than longest_border_edge_percent of it;
-// simplified polylines are edges of the TIN and cross no more than they did before; heights are
-// multiples of the step and lie within the range of the posts' own. There is no bound on the
-// vertical error. Random choices come from the seed alone. Pure: same input and seed, same bits.
+// their own heights; on a free side no edge is longer than longest_border_edge_percent of it, or
+// than one post spacing; simplified polylines are edges of the TIN, or rows of edges on one line in
+// (u, v), and do not cross; heights are multiples of the step and lie within the range of the
+// posts' own. Only WLOP makes vertices that are no posts; its heights follow the globe
+// (stages/wlop.h). There is no bound on the vertical error. Vertices come by v, then u. Random
+// choices come from the seed alone. Pure: same input and seed, same bits. Safe from several threads.
 #pragma once
 
 #include <cstdint>
@@ -32,9 +34,9 @@ struct PointSetOptions {
   // Polylines. p_e: largest distance in metres, in space, of a removed point from the segment in its
   // place.
   double polyline_error_m = 1;
-  // p_b: of the side's length.
+  // p_b: of the side's length in (u, v).
   double longest_border_edge_percent = 10;
-  // p_m: sharp polylines of fewer points do not count.
+  // p_m: sharp polylines of fewer points do not count; their points are points as all others.
   std::int32_t least_polyline_points = 25;
   // Edges whose triangles' normals are farther apart than this, in scaled coordinates, are sharp.
   double sharp_angle_deg = 60;
@@ -53,7 +55,7 @@ struct PointSetOptions {
 
 // Distances between points are taken in ECEF on the globe (section 4.4.1), else in the plane's metres.
 // REQUIRES: grid.post_count() finite heights; fixed borders only for a tile's 257 x 257 posts;
-// percentages 0..100; sizes > 0.
+// percentages 0..100; sizes > 0; the variation and the number of iterations >= 0.
 Tin simplify_point_set(const PostGrid& grid, std::span<const float> heights_m,
                        const FixedBorders& fixed, const PointSetOptions& options);
 
