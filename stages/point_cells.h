@@ -5,6 +5,7 @@
 // the radius alone. const use is safe from several threads.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <span>

@@ -1,6 +1,7 @@
 #include "stages/polylines.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <queue>

@@ -1,6 +1,7 @@
 #include "stages/wlop.h"
 
 #include <cmath>
+#include <utility>
 
 #include "stages/point_cells.h"
 
