@@ -185,13 +185,53 @@ bool CollapseSurface::fits(Index e, const Candidate& candidate) const {
   });
 }
 
+// Only what changes in the sums around is taken out and put in: to walk the neighbours' own stars would
+// double the time of a run. What subtraction loses is as small as what any sum of doubles does, and
+// goes when edge_collapse() begins its next round with new sums.
+void CollapseSurface::add_to_ring(Index v, Index other, double factor) {
+  const Vector3 here = places_[at(v)];
+  const auto add_neighbour = [&](Index w) {
+    if (w == other) return;
+    StarSums& sums = sums_[at(w)];
+    const Vector3 offset = here - places_[at(w)];
+    sums.neighbours += factor * offset;
+    sums.squared_distances += factor * dot(offset, offset);
+    sums.degree += factor;
+  };
+  mesh_.each_leaving(v, [&](Index e) {
+    const Index x = mesh_.target(e);
+    const Index back = CollapseMesh::previous(e);
+    const Index y = mesh_.origin(back);
+    const Vector3 normal = cross(places_[at(x)] - here, places_[at(y)] - here);
+    for (const Index w : {x, y}) {
+      if (w == other) continue;
+      sums_[at(w)].normals += factor * normal;
+      sums_[at(w)].planes.add_outer(factor, normal);
+    }
+    add_neighbour(x);
+    if (mesh_.on_hull(back)) add_neighbour(y);
+  });
+}
+
 CollapseSurface::Index CollapseSurface::collapse(Index e, const Candidate& candidate) {
-  const Index v = candidate.kept == kNone ? mesh_.origin(e) : candidate.kept;
+  const Index a = mesh_.origin(e);
+  const Index b = mesh_.target(e);
+  const Index v = candidate.kept == kNone ? a : candidate.kept;
+  add_to_ring(a, b, -1);
+  add_to_ring(b, a, -1);
+  // The edge's own triangles were taken out twice, where they have their tips.
+  const Vector3 along = places_[at(b)] - places_[at(a)];
+  for (const Index h : {e, mesh_.twin(e)}) {
+    if (h == kNone) continue;
+    const Index tip = mesh_.origin(CollapseMesh::previous(h));
+    const Vector3 normal = cross(along, places_[at(tip)] - places_[at(a)]);
+    sums_[at(tip)].add_triangle(h == e ? normal : -1 * normal);
+  }
   mesh_.collapse(e, v);
   vertices_[at(v)] = candidate.vertex;
   places_[at(v)] = scaled(candidate.vertex);
   update_sums(v);
-  mesh_.each_neighbour(v, [&](Index w) { update_sums(w); });
+  add_to_ring(v, kNone, 1);
   return v;
 }
 

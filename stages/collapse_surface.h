@@ -66,6 +66,8 @@ class CollapseSurface {
   }
   bool is_corner(Index v) const { return (sides_[at(v)] & (sides_[at(v)] - 1U)) != 0; }
   void update_sums(Index v);
+  // Adds what v contributes to its neighbours' sums, `other`'s excepted: factor 1, or -1 to take it out.
+  void add_to_ring(Index v, Index other, double factor);
   EdgeQuadric quadric(Index e) const;
   double boundary_cost(Index e, const Vector3& place) const;
   double cost_of(Index e, const EdgeQuadric& quadric, const Vector3& place) const;
