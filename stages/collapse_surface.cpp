@@ -8,22 +8,25 @@
 
 namespace qmpipe {
 
+CollapseSurface::HeightRange CollapseSurface::height_range(const Tin& tin) {
+  const auto [low, high] = std::minmax_element(
+      tin.vertices.begin(), tin.vertices.end(),
+      [](const TinVertex& a, const TinVertex& b) { return a.height_m < b.height_m; });
+  return {.low_m = low->height_m, .high_m = high->height_m};
+}
+
 CollapseSurface::CollapseSurface(const PostGrid& grid, const Tin& tin, const FixedBorders& fixed,
                                  double height_step_m, const CollapseWeights& weights)
     : grid_(&grid),
       weights_(weights),
       height_step_m_(height_step_m),
+      heights_(height_range(tin)),
       mesh_(tin.indices, tin.vertices.size()),
       vertices_(tin.vertices),
       sums_(tin.vertices.size()) {
   QMPIPE_CHECK(height_step_m > 0);
-  const auto [low, high] = std::minmax_element(
-      vertices_.begin(), vertices_.end(),
-      [](const TinVertex& a, const TinVertex& b) { return a.height_m < b.height_m; });
-  low_m_ = low->height_m;
-  high_m_ = high->height_m;
   scale_ = {1.0 / grid.u_max(), 1.0 / grid.v_max(),
-            high_m_ > low_m_ ? 1 / (high_m_ - low_m_) : 0.0};
+            heights_.high_m > heights_.low_m ? 1 / (heights_.high_m - heights_.low_m) : 0.0};
   const auto bit = [](Side side) { return static_cast<std::uint8_t>(1U << index_of(side)); };
   for (const Side side : kSides) {
     if (fixed[index_of(side)]) fixed_sides_ |= bit(side);
@@ -108,8 +111,9 @@ TinVertex CollapseSurface::rounded(const Vector3& place) const {
     return static_cast<std::int32_t>(
         std::lround(std::clamp(scaled * size, 1.0, static_cast<double>(size - 1))));
   };
-  const double height_m =
-      scale_.z > 0 ? std::clamp(low_m_ + place.z / scale_.z, low_m_, high_m_) : low_m_;
+  const double height_m = scale_.z > 0 ? std::clamp(heights_.low_m + place.z / scale_.z,
+                                                    heights_.low_m, heights_.high_m)
+                                       : heights_.low_m;
   return {.u = units(place.x, grid_->u_max()),
           .v = units(place.y, grid_->v_max()),
           .post = kNoPost,

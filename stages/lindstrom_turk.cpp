@@ -86,21 +86,20 @@ class Constraints {
 
 }  // namespace
 
+// The target's planes are moved to the origin's place; those of the edge's own triangles pass through
+// both and need no moving, but were counted twice.
 EdgeQuadric::EdgeQuadric(const StarSums& origin, const StarSums& target, const Vector3& along,
                          std::span<const EdgeTriangle> shared)
-    : squared_length_(dot(along, along)) {
-  // The target's planes are moved to the origin's place; those of the edge's own triangles pass
-  // through both and need no moving, but were counted twice.
-  slope_ = target.planes.times(along);
-  constant_ = dot(along, slope_);
-  normals_ = origin.normals + target.normals;
-  volume_ = dot(target.normals, along);
-  planes_ = origin.planes;
-  planes_ += target.planes;
-  link_ = origin.neighbours + target.neighbours + (target.degree - 1) * along;
-  link_squares_ = origin.squared_distances + target.squared_distances +
-                  2 * dot(along, target.neighbours) + (target.degree - 1) * squared_length_;
-  link_size_ = origin.degree + target.degree - 2;
+    : squared_length_(dot(along, along)),
+      normals_(origin.normals + target.normals),
+      volume_(dot(target.normals, along)),
+      planes_(origin.planes + target.planes),
+      slope_(target.planes.times(along)),
+      constant_(dot(along, slope_)),
+      link_(origin.neighbours + target.neighbours + (target.degree - 1) * along),
+      link_squares_(origin.squared_distances + target.squared_distances +
+                    2 * dot(along, target.neighbours) + (target.degree - 1) * squared_length_),
+      link_size_(origin.degree + target.degree - 2) {
   for (const EdgeTriangle& triangle : shared) {
     normals_ = normals_ - triangle.normal;
     planes_.add_outer(-1, triangle.normal);
