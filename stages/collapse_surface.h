@@ -59,13 +59,21 @@ class CollapseSurface {
   Tin tin() const;
 
  private:
+  struct HeightRange {
+    double low_m = 0;
+    double high_m = 0;
+  };
+  static HeightRange height_range(const Tin& tin);
   static std::size_t at(Index i) { return static_cast<std::size_t>(i); }
   IntPoint point(Index v) const { return {vertices_[at(v)].u, vertices_[at(v)].v}; }
   Vector3 scaled(const TinVertex& vertex) const {
-    return {vertex.u * scale_.x, vertex.v * scale_.y, (vertex.height_m - low_m_) * scale_.z};
+    return {vertex.u * scale_.x, vertex.v * scale_.y,
+            (vertex.height_m - heights_.low_m) * scale_.z};
   }
   bool is_corner(Index v) const { return (sides_[at(v)] & (sides_[at(v)] - 1U)) != 0; }
   void update_sums(Index v);
+  // Adds what v contributes to its neighbours' sums, `other`'s excepted: factor 1, or -1 to take it out.
+  void add_to_ring(Index v, Index other, double factor);
   EdgeQuadric quadric(Index e) const;
   double boundary_cost(Index e, const Vector3& place) const;
   double cost_of(Index e, const EdgeQuadric& quadric, const Vector3& place) const;
@@ -83,8 +91,7 @@ class CollapseSurface {
   const PostGrid* grid_;
   CollapseWeights weights_;
   double height_step_m_;
-  double low_m_ = 0;
-  double high_m_ = 0;
+  HeightRange heights_;
   Vector3 scale_;  // from units and metres to the scaled coordinates of section 4.4.1
   CollapseMesh mesh_;
   std::vector<TinVertex> vertices_;

@@ -5,9 +5,13 @@
 // is more than the paper's ban on vertical walls; corners stay; on a fixed side exactly the given
 // posts are vertices; vertices on the sides are posts with their own heights; heights are multiples
 // of the step and lie within the range of the posts' own. With a tolerance every post that is not
-// a vertex is within it, measured as greedy insertion does (stages/post_errors.h), and nothing
-// more can be collapsed. Costs and places are computed in scaled coordinates (section 4.4.1); ties
-// are broken by the vertices' posts. Pure: same input, same bits.
+// a vertex is within it, measured as greedy insertion does (stages/post_errors.h), and the end comes
+// when no edge can be collapsed into its best place, an end or its middle. Costs and places are
+// computed in scaled coordinates (section 4.4.1); equal costs go by the order of the dense TIN's
+// triangles, which is that of the posts. Pure: same input, same bits.
+//
+// At the tolerance at which greedy insertion has 300 to 3000 vertices, on SRTM's Maritime Alps, it
+// needs about 0.4 of the triangles (perf/edge_collapse_bench).
 #pragma once
 
 #include <cstdint>

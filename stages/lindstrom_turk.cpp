@@ -31,7 +31,13 @@ class Constraints {
 
   // The lowest place of x' h x - 2 slope * x in what the planes so far leave free.
   void add_minimum(const Symmetric3& h, const Vector3& slope) {
-    const auto add_along = [&](const Vector3& free) { add(h.times(free), dot(free, slope)); };
+    const double size = h.xx + h.yy + h.zz;
+    const auto add_along = [&](const Vector3& free) {
+      const Vector3 normal = h.times(free);
+      // On a plane nothing is left but rounding errors, which point anywhere.
+      if (dot(normal, normal) <= kSquaredNoise * size * size * dot(free, free)) return;
+      add(normal, dot(free, slope));
+    };
     if (count_ == 0) {
       add_along({1, 0, 0});
       add_along({0, 1, 0});
@@ -59,6 +65,7 @@ class Constraints {
 
  private:
   static constexpr double kSquaredCosine = 0.99969541350954788;  // of one degree
+  static constexpr double kSquaredNoise = 1e-26;
   static constexpr double kSquaredSine = 0.00030458649045211894;
 
   // A direction in the plane: across the axis that the normal is nearest to.
@@ -79,21 +86,20 @@ class Constraints {
 
 }  // namespace
 
+// The target's planes are moved to the origin's place; those of the edge's own triangles pass through
+// both and need no moving, but were counted twice.
 EdgeQuadric::EdgeQuadric(const StarSums& origin, const StarSums& target, const Vector3& along,
                          std::span<const EdgeTriangle> shared)
-    : squared_length_(dot(along, along)) {
-  // The target's planes are moved to the origin's place; those of the edge's own triangles pass
-  // through both and need no moving, but were counted twice.
-  slope_ = target.planes.times(along);
-  constant_ = dot(along, slope_);
-  normals_ = origin.normals + target.normals;
-  volume_ = dot(target.normals, along);
-  planes_ = origin.planes;
-  planes_ += target.planes;
-  link_ = origin.neighbours + target.neighbours + (target.degree - 1) * along;
-  link_squares_ = origin.squared_distances + target.squared_distances +
-                  2 * dot(along, target.neighbours) + (target.degree - 1) * squared_length_;
-  link_size_ = origin.degree + target.degree - 2;
+    : squared_length_(dot(along, along)),
+      normals_(origin.normals + target.normals),
+      volume_(dot(target.normals, along)),
+      planes_(origin.planes + target.planes),
+      slope_(target.planes.times(along)),
+      constant_(dot(along, slope_)),
+      link_(origin.neighbours + target.neighbours + (target.degree - 1) * along),
+      link_squares_(origin.squared_distances + target.squared_distances +
+                    2 * dot(along, target.neighbours) + (target.degree - 1) * squared_length_),
+      link_size_(origin.degree + target.degree - 2) {
   for (const EdgeTriangle& triangle : shared) {
     normals_ = normals_ - triangle.normal;
     planes_.add_outer(-1, triangle.normal);

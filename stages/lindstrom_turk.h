@@ -55,14 +55,8 @@ struct Symmetric3 {
     yz += f.y * n.z;
     zz += f.z * n.z;
   }
-  Symmetric3& operator+=(const Symmetric3& b) {
-    xx += b.xx;
-    xy += b.xy;
-    xz += b.xz;
-    yy += b.yy;
-    yz += b.yz;
-    zz += b.zz;
-    return *this;
+  friend Symmetric3 operator+(const Symmetric3& a, const Symmetric3& b) {
+    return {a.xx + b.xx, a.xy + b.xy, a.xz + b.xz, a.yy + b.yy, a.yz + b.yz, a.zz + b.zz};
   }
   Vector3 times(const Vector3& a) const {
     return {xx * a.x + xy * a.y + xz * a.z, xy * a.x + yy * a.y + yz * a.z,
