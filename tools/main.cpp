@@ -12,6 +12,7 @@
 #include "tools/command_build.h"
 #include "tools/command_info.h"
 #include "tools/command_synth.h"
+#include "tools/command_tin.h"
 #include "tools/command_verify.h"
 
 namespace {
@@ -29,7 +30,7 @@ int fail(int code, const std::string& message) {
 int run(int argc, char** argv) {
   CLI::App app{
       "qmpipe turns digital elevation models of any size into quantized-mesh terrain pyramids for "
-      "web globes."};
+      "web globes, and single ones into TINs."};
   app.name("qmpipe");
   app.set_version_flag("--version", std::string("qmpipe ") + qmpipe::kProgramVersion);
   app.require_subcommand(1);
@@ -38,6 +39,7 @@ int run(int argc, char** argv) {
   qmpipe::register_build(app, action);
   qmpipe::register_verify(app, action);
   qmpipe::register_info(app, action);
+  qmpipe::register_tin(app, action);
   qmpipe::register_synth(app, action);
   try {
     app.parse(argc, argv);
