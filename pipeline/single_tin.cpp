@@ -26,7 +26,7 @@ std::int64_t bytes_per_post(Method method) {
     case Method::kGreedy:
       return 80;
     case Method::kEdgeCollapse:
-      return 450;
+      return 520;
     case Method::kPsRandom:
     case Method::kPsGrid:
     case Method::kPsHierarchy:

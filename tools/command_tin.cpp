@@ -27,7 +27,9 @@ constexpr const char* kFooter =
     "those of Campos et al. 2020 for single DEMs (Table 2): g_e=5 g_g=0 e_e=2000 p_e=100 p_b=5\n"
     "p_m=10 r_r=98.5 d_g=1000 h_c=150 h_v=1e-4 w_p=1.5 w_r=25 w_i=15; of a series by zoom the "
     "value\n"
-    "of zoom 0 counts. With --tolerance, p_e is the tolerance unless it is given.\n"
+    "of zoom 0 counts. Unless they are given, p_e is the tolerance with --tolerance, and h_v is "
+    "1/3\n"
+    "with --triangles, so that h_c alone decides.\n"
     "Voids are left out of the mesh; errors are those of valid posts. Same input, same bytes.\n"
     "An existing MESH is replaced.\n"
     "\n"
@@ -74,7 +76,11 @@ SingleTinOptions to_options(const TinArguments& arguments) {
     // Borders and sharp edges would else be coarser than the tolerance whatever is left of the rest.
     options.parameters.set("p_e", ZoomSeries({arguments.tolerance_m}));
   }
-  if (arguments.triangles_given) options.target.most_triangles = arguments.triangles;
+  if (arguments.triangles_given) {
+    options.target.most_triangles = arguments.triangles;
+    // Any value: clusters as large as it takes, however rough.
+    options.parameters.set("h_v", ZoomSeries({1.0 / 3}));
+  }
   const MethodChoice choice = to_choice(arguments.method, short_forms, options.parameters);
   options.input = arguments.input;
   options.source_crs = arguments.source_crs;
