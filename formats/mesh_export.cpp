@@ -205,7 +205,7 @@ Bytes stl_bytes(const ExportMesh& mesh) {
   bytes.reserve(84 + 50 * (mesh.indices.size() / 3));
   append(bytes, static_cast<std::uint32_t>(mesh.indices.size() / 3));
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
-    std::array<Float3, 3> corners;
+    std::array<Float3, 3> corners{};
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3& p = mesh.positions_m[mesh.indices[i + k]];
       corners[k] = {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
