@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <string_view>
+#include <utility>
 
 #include "formats/errors.h"
 #include "stages/void_posts.h"
@@ -88,8 +89,11 @@ std::int64_t covered_voids(const Dem& dem, const Tin& tin) {
 
 class Aim {
  public:
-  Aim(const Dem& dem, const TinMethod& method, const TinTarget& target)
-      : dem_(dem), method_(method), target_(target), tolerance_m_(tolerance_that_counts()) {
+  Aim(const Dem& dem, TinMethod method, const TinTarget& target)
+      : dem_(dem),
+        method_(std::move(method)),
+        target_(target),
+        tolerance_m_(tolerance_that_counts()) {
     const double least_m = least_tolerance_m(dem);
     if (tolerance_m_ && *tolerance_m_ < least_m) {
       throw UsageError(fmt::format(
@@ -174,7 +178,8 @@ class Aim {
     // and B is at least 4. Edge collapse stops below the number that it is given.
     method_.stop = Stop::kEdges;
     method_.values.erase("g_e");
-    method_.values["e_e"] = static_cast<double>((3 * *target_.most_triangles + 4) / 2 + 1);
+    const std::int64_t most_edges = (3 * *target_.most_triangles + 4) / 2;
+    method_.values["e_e"] = static_cast<double>(most_edges + 1);
   }
 
   TargetedTin attempt(const ParameterValues& values) {
