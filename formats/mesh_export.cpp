@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -80,6 +81,8 @@ constexpr int kFloat32 = 5126;
 constexpr int kUint32 = 5125;
 constexpr int kVertexData = 34962;
 constexpr int kIndexData = 34963;
+// Lengths are 32 bits; a little less for the two chunks' headers.
+constexpr std::size_t kMostGlbBytes = 0xFFFFFF00;
 
 // The JSON and the binary chunk as they grow.
 struct GlbParts {
@@ -158,6 +161,9 @@ Bytes glb_bytes(const ExportMesh& mesh) {
   document["accessors"] = std::move(parts.accessors);
   std::string json = document.dump();
   json.resize((json.size() + 3) / 4 * 4, ' ');
+  if (parts.binary.size() + json.size() > kMostGlbBytes) {
+    throw UsageError("the mesh is larger than the 4 GiB of a GLB; write a .ply, or a coarser mesh");
+  }
 
   constexpr std::uint32_t kGltf = 0x46546C67;
   constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
@@ -176,6 +182,57 @@ Bytes glb_bytes(const ExportMesh& mesh) {
   return bytes;
 }
 
+// The unit normal of a triangle as it is stored; zero for one that float32 has flattened.
+Float3 normal_of(const std::array<Float3, 3>& corners) {
+  Vec3 p{};
+  Vec3 q{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    p[k] = static_cast<double>(corners[1][k]) - static_cast<double>(corners[0][k]);
+    q[k] = static_cast<double>(corners[2][k]) - static_cast<double>(corners[0][k]);
+  }
+  const Vec3 n = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
+  const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+  if (length == 0) return {};
+  return {static_cast<float>(n[0] / length), static_cast<float>(n[1] / length),
+          static_cast<float>(n[2] / length)};
+}
+
+Bytes stl_bytes(const ExportMesh& mesh) {
+  // Not "solid", with which a text file begins.
+  std::string header = "binary STL written by qmpipe, metres, z up";
+  header.resize(80, ' ');
+  Bytes bytes(header.begin(), header.end());
+  bytes.reserve(84 + 50 * (mesh.indices.size() / 3));
+  append(bytes, static_cast<std::uint32_t>(mesh.indices.size() / 3));
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    std::array<Float3, 3> corners{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3& p = mesh.positions_m[mesh.indices[i + k]];
+      corners[k] = {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+    }
+    for (const float value : normal_of(corners)) append(bytes, value);
+    for (const Float3& corner : corners) {
+      for (const float value : corner) append(bytes, value);
+    }
+    append(bytes, std::uint16_t{0});
+  }
+  return bytes;
+}
+
+Bytes bytes_of(const ExportMesh& mesh, MeshFormat format) {
+  switch (format) {
+    case MeshFormat::kPly:
+      return ply_bytes(mesh);
+    case MeshFormat::kObj:
+      return obj_bytes(mesh);
+    case MeshFormat::kGlb:
+      return glb_bytes(mesh);
+    case MeshFormat::kStl:
+      break;
+  }
+  return stl_bytes(mesh);
+}
+
 void check_mesh(const ExportMesh& mesh) {
   QMPIPE_CHECK(!mesh.positions_m.empty());
   QMPIPE_CHECK(!mesh.indices.empty() && mesh.indices.size() % 3 == 0);
@@ -186,20 +243,23 @@ void check_mesh(const ExportMesh& mesh) {
 
 }  // namespace
 
-void write_mesh_file(const std::filesystem::path& path, const ExportMesh& mesh) {
+MeshFormat mesh_format_of(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const bool is_known = extension == ".ply" || extension == ".obj" || extension == ".glb";
-  if (!is_known) {
-    throw UsageError(fmt::format(
-        "cannot tell the mesh format of {} from its extension; end it in .ply, .obj or .glb",
-        path.string()));
-  }
+  if (extension == ".ply") return MeshFormat::kPly;
+  if (extension == ".obj") return MeshFormat::kObj;
+  if (extension == ".glb") return MeshFormat::kGlb;
+  if (extension == ".stl") return MeshFormat::kStl;
+  throw UsageError(fmt::format(
+      "cannot tell the mesh format of {} from its extension; end it in .ply, .obj, .glb or .stl",
+      path.string()));
+}
+
+void write_mesh_file(const std::filesystem::path& path, const ExportMesh& mesh) {
+  const MeshFormat format = mesh_format_of(path);
   check_mesh(mesh);
-  if (extension == ".ply") return write_file_atomically(path, ply_bytes(mesh));
-  if (extension == ".obj") return write_file_atomically(path, obj_bytes(mesh));
-  write_file_atomically(path, glb_bytes(mesh));
+  write_file_atomically(path, bytes_of(mesh, format));
 }
 
 }  // namespace qmpipe

@@ -97,9 +97,10 @@ OGRSpatialReference crs_from_prj(const fs::path& prj) {
   return crs;
 }
 
+// Empty where there is none and none is required.
 OGRSpatialReference find_crs(GDALDataset& dataset, const std::string& path,
                              const std::string& opened, const std::string& override_text,
-                             std::vector<std::string>& assumptions) {
+                             CrsNeed need, std::vector<std::string>& assumptions) {
   OGRSpatialReference crs;
   if (!override_text.empty()) {
     crs = crs_from_text(override_text);
@@ -115,6 +116,8 @@ OGRSpatialReference find_crs(GDALDataset& dataset, const std::string& path,
     assumptions.emplace_back(
         "the file names no CRS; its axes are longitude and latitude, so EPSG:4326"
         " (WGS84) is taken");
+  } else if (need == CrsNeed::kOptional) {
+    assumptions.emplace_back("the file names no CRS; its coordinates are taken as metres");
   } else {
     throw IoError("cannot place the raster", path, "it has no coordinate reference system",
                   kNoCrsRemedy);
@@ -143,9 +146,11 @@ std::string wkt_of(const OGRSpatialReference& crs) {
 }  // namespace
 
 RasterCrs crs_of(GDALDataset& dataset, const std::string& path, const std::string& opened,
-                 const std::string& override_text) {
+                 const std::string& override_text, CrsNeed need) {
   RasterCrs result;
-  OGRSpatialReference crs = find_crs(dataset, path, opened, override_text, result.assumptions);
+  OGRSpatialReference crs =
+      find_crs(dataset, path, opened, override_text, need, result.assumptions);
+  if (crs.IsEmpty()) return result;
   result.name = crs.GetName() != nullptr ? crs.GetName() : "unnamed";
   result.has_vertical_datum = crs.IsVertical() != 0 || crs.GetAxesCount() == 3;
   if (crs.IsCompound() != 0) {
@@ -165,6 +170,9 @@ RasterCrs crs_of(GDALDataset& dataset, const std::string& path, const std::strin
         2 * std::numbers::pi / crs.GetAngularUnits(static_cast<const char**>(nullptr));
     // GDAL's radians per degree have sixteen digits at best.
     result.turn = std::abs(turn - 360) < 1e-6 ? 360 : turn;
+  } else {
+    const double metres = crs.GetLinearUnits(static_cast<const char**>(nullptr));
+    if (metres > 0 && std::isfinite(metres)) result.metres_per_unit = metres;
   }
   result.text.wkt = wkt_of(crs);
   return result;

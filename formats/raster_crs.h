@@ -15,7 +15,8 @@ struct RasterCrs {
   CrsText text;  // horizontal part only
   std::string name;
   bool is_geographic = false;
-  double turn = 360;  // once round the globe in the unit of a geographic CRS
+  double turn = 360;           // once round the globe in the unit of a geographic CRS
+  double metres_per_unit = 1;  // of a plane CRS's x and y
   bool has_vertical_datum = false;
   // Of a compound CRS's heights; empty when the CRS says nothing about heights.
   std::string vertical_unit;
@@ -24,10 +25,12 @@ struct RasterCrs {
   std::vector<std::string> assumptions;
 };
 
+enum class CrsNeed { kRequired, kOptional };
+
 // `path` is what the user named, `opened` what GDAL opened in the end; `override_text` (anything
-// GDAL understands as a CRS) may be empty. Throws IoError when there is no CRS, UsageError when the
-// override is not a CRS.
+// GDAL understands as a CRS) may be empty. Throws IoError when there is no CRS and one is required
+// (otherwise it is then a plane in metres, without text), UsageError when the override is not a CRS.
 RasterCrs crs_of(GDALDataset& dataset, const std::string& path, const std::string& opened,
-                 const std::string& override_text);
+                 const std::string& override_text, CrsNeed need);
 
 }  // namespace qmpipe

@@ -68,11 +68,13 @@ struct HeightRule {
   }
 };
 
-Affine affine_of(GDALDataset& dataset, const std::string& path) {
+// None when the file has no geotransform and does not need one: in a plane without CRS.
+std::optional<Affine> affine_of(GDALDataset& dataset, const std::string& path, CrsNeed need) {
   std::array<double, 6> g{};
   const bool is_given = dataset.GetGeoTransform(g.data()) == CE_None;
   if (!is_given || g == std::array<double, 6>{0, 1, 0, 0, 0, 1}) {
     const bool has_points = dataset.GetGCPCount() > 0;
+    if (need == CrsNeed::kOptional && !has_points) return std::nullopt;
     throw IoError("cannot place the raster", path,
                   has_points ? "it has ground control points, but no geotransform"
                              : "it has no geotransform: nothing says where its pixels lie",
@@ -178,7 +180,8 @@ struct RasterSource::Impl {
   std::vector<std::uint8_t> mask;
 
   void describe(const std::string& path);
-  void place(const RasterCrs& crs);
+  void place_in_plane(const RasterCrs& crs);
+  void place_on_globe(const RasterCrs& crs);
   void measure();
   std::optional<PixelPoint> pixel_at(const LonLat& point) const;
   std::optional<LonLat> globe_at(const PixelPoint& point) const;
@@ -222,13 +225,29 @@ void RasterSource::Impl::describe(const std::string& path) {
   }
 }
 
-void RasterSource::Impl::place(const RasterCrs& crs) {
+void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
   info.crs_name = crs.name;
   info.is_geographic = crs.is_geographic;
   info.has_vertical_datum = crs.has_vertical_datum;
   info.assumptions.insert(info.assumptions.end(), crs.assumptions.begin(), crs.assumptions.end());
-  affine = affine_of(*opened.dataset, info.path);
+  const CrsNeed need = crs.text.wkt.empty() ? CrsNeed::kOptional : CrsNeed::kRequired;
+  const std::optional<Affine> given = affine_of(*opened.dataset, info.path, need);
+  // As a picture lies: the first row is the northernmost.
+  affine = given.value_or(Affine{0, 1, 0, static_cast<double>(info.height), 0, -1});
+  if (!given) {
+    info.assumptions.emplace_back("the file has no geotransform; a pixel is taken as a metre");
+  }
+  info.plane = {.x0 = affine.a,
+                .x_per_column = affine.b,
+                .x_per_row = affine.c,
+                .y0 = affine.d,
+                .y_per_column = affine.e,
+                .y_per_row = affine.f,
+                .unit = crs.is_geographic ? 360 / crs.turn : crs.metres_per_unit};
   rule = height_rule_of(*band, crs, info);
+}
+
+void RasterSource::Impl::place_on_globe(const RasterCrs& crs) {
   const std::vector<MapPoint> points = sample_points(affine, info);
   transform = CrsTransform::make(crs.text, points);
   if (!transform) {
@@ -287,14 +306,21 @@ std::unique_ptr<RasterSource> RasterSource::open(const std::string& path,
   auto impl = std::make_unique<Impl>();
   impl->opened = open_dataset(path);
   impl->describe(path);
-  impl->place(crs_of(*impl->opened.dataset, path, impl->opened.name, options.crs_override));
-  impl->measure();
+  const bool on_globe = options.placing == Placing::kGlobe;
+  const RasterCrs crs = crs_of(*impl->opened.dataset, path, impl->opened.name, options.crs_override,
+                               on_globe ? CrsNeed::kRequired : CrsNeed::kOptional);
+  impl->place_in_plane(crs);
+  if (on_globe) {
+    impl->place_on_globe(crs);
+    impl->measure();
+  }
   describe_blocks(*impl->band, impl->rule.has_mask, impl->info);
   impl->reader.emplace(*impl->band, impl->rule.has_mask, impl->info, options.cache, options.number);
   return std::unique_ptr<RasterSource>(new RasterSource(std::move(impl)));
 }
 
 std::optional<PixelPoint> RasterSource::pixel_at(double longitude_deg, double latitude_deg) const {
+  QMPIPE_CHECK(impl_->transform != nullptr);
   return impl_->pixel_at({.longitude_deg = longitude_deg, .latitude_deg = latitude_deg});
 }
 

@@ -35,6 +35,19 @@ struct PixelWindow {
   std::size_t size() const { return static_cast<std::size_t>(width * height); }
 };
 
+// Where pixels lie in the raster's own CRS, as its geotransform says: a pixel's outer corner (c, r)
+// is at x = x0 + x_per_column c + x_per_row r, and y likewise.
+struct PixelPlane {
+  double x0 = 0;
+  double x_per_column = 1;
+  double x_per_row = 0;
+  double y0 = 0;
+  double y_per_column = 0;
+  double y_per_row = -1;
+  // One unit of x and y: degrees in a geographic CRS, else metres.
+  double unit = 1;
+};
+
 struct RasterInfo {
   std::string path;
   std::string driver;
@@ -54,6 +67,8 @@ struct RasterInfo {
   std::int64_t cached_block_bytes = 0;
   // What an open handle on the file may keep of the block it read last.
   std::int64_t handle_bytes = 0;
+  PixelPlane plane;
+  // From here on only where the raster is placed on the globe.
   // Smallest extent of a pixel in degrees of longitude or latitude, measured at the centre of the
   // raster and at its corners; decides the sampling zoom.
   double pixel_deg = 0;
@@ -73,6 +88,11 @@ struct RasterInfo {
   std::vector<std::string> assumptions;
 };
 
+// On the globe every point must have a pixel; in the plane of its own CRS a raster needs no way from
+// there to the globe, nor a CRS at all (then x and y are metres), nor a geotransform (then a pixel is
+// a metre).
+enum class Placing { kGlobe, kPlane };
+
 struct OpenOptions {
   // Taken instead of the file's CRS; anything GDAL understands (EPSG:n, WKT, PROJ, a .prj file).
   // DEFAULT: empty, the file's own.
@@ -82,6 +102,7 @@ struct OpenOptions {
   std::shared_ptr<SourceBlockCache> cache = {};
   // The same for all handles on one file in one cache, and different for every file.
   std::uint32_t number = 0;
+  Placing placing = Placing::kGlobe;
 };
 
 class RasterSource {
@@ -101,6 +122,7 @@ class RasterSource {
   // Where a point of the globe (WGS84) lies on the raster, exactly transformed; may lie outside the
   // raster. For rasters in degrees the longitude is first moved by multiples of 360 to within 180
   // of the raster's middle. None where the CRS does not reach the point.
+  // REQUIRES: Placing::kGlobe.
   std::optional<PixelPoint> pixel_at(double longitude_deg, double latitude_deg) const;
 
   // Reads a window that lies inside the raster, row by row from the top, voids as NaN.

@@ -1,7 +1,6 @@
 #include "pipeline/memory_share.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <limits>
@@ -9,6 +8,7 @@
 #include "formats/errors.h"
 #include "formats/hdf5_lattice_store.h"
 #include "pipeline/block_cover.h"
+#include "pipeline/process_memory.h"
 #include "pipeline/sampling_order.h"
 
 namespace qmpipe {
@@ -18,13 +18,6 @@ constexpr std::int64_t kBlockBytes =
     std::int64_t{kBlockPosts} * kBlockPosts * static_cast<std::int64_t>(sizeof(float));
 // The index of the store on disk.
 constexpr std::int64_t kIndexBytesPerBlock = 112;
-
-// Without a limit of the user's, what the machine has: running out of it would end the process
-// without a word.
-std::int64_t effective_limit(std::int64_t limit_bytes) {
-  if (limit_bytes > 0) return limit_bytes;
-  return static_cast<std::int64_t>(sysconf(_SC_PHYS_PAGES)) / 10 * 9 * sysconf(_SC_PAGESIZE);
-}
 
 MemoryNeeds needs_of(const SurveyOptions& survey, const std::vector<RasterInfo>& sources,
                      std::int64_t limit_bytes) {
@@ -107,7 +100,7 @@ MemoryShare choose(const std::vector<Division>& divisions, std::int64_t limit_by
 
 MemoryShare share_memory(const MemoryRequest& request, const SurveyOptions& survey,
                          const std::vector<RasterInfo>& sources) {
-  const std::int64_t limit = effective_limit(request.limit_bytes);
+  const std::int64_t limit = memory_limit_bytes(request.limit_bytes);
   const std::int32_t sampling_zoom = chosen_sampling_zoom(survey, sources);
   MemoryNeeds needs = needs_of(survey, sources, limit);
   needs.simplify_bytes = request.simplify_bytes;

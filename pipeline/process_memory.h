@@ -5,6 +5,10 @@
 
 namespace qmpipe {
 
+// What the user allows, or nine tenths of the machine's memory where that is 0: running out of it
+// would end the process without a word.
+std::int64_t memory_limit_bytes(std::int64_t wanted_bytes);
+
 // The most that was resident so far.
 std::int64_t peak_resident_bytes();
 

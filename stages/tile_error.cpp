@@ -15,49 +15,93 @@ namespace {
 // agree on it.
 constexpr double kMargin = 1e-6;
 
-IntPoint corner(const QuantizedMesh& mesh, std::uint32_t vertex) {
-  return {mesh.u[vertex], mesh.v[vertex]};
+// What both kinds of mesh come down to.
+struct Surface {
+  std::vector<IntPoint> places;
+  std::vector<double> heights_m;
+  std::vector<std::int32_t> posts;  // that the vertices are, or kNoPost
+  std::span<const std::uint32_t> indices;
+};
+
+std::int32_t post_at(const PostGrid& grid, const IntPoint& place) {
+  const auto column = std::lower_bound(grid.u.begin(), grid.u.end(), place.x);
+  const auto row = std::lower_bound(grid.v.begin(), grid.v.end(), place.y);
+  if (column == grid.u.end() || *column != place.x) return kNoPost;
+  if (row == grid.v.end() || *row != place.y) return kNoPost;
+  return grid.index(static_cast<std::int32_t>(column - grid.u.begin()),
+                    static_cast<std::int32_t>(row - grid.v.begin()));
 }
 
-std::vector<double> surface_at_posts(const PostGrid& grid, const QuantizedMesh& mesh) {
-  std::vector<double> surface(kTilePostCount, std::numeric_limits<double>::quiet_NaN());
-  for (std::size_t t = 0; t + 2 < mesh.indices.size(); t += 3) {
-    const IntPoint a = corner(mesh, mesh.indices[t]);
-    const IntPoint b = corner(mesh, mesh.indices[t + 1]);
-    const IntPoint c = corner(mesh, mesh.indices[t + 2]);
-    if (orientation(a, b, c) <= 0) continue;
-    const Plane plane = plane_through(a, b, c, decoded_height_m(mesh, mesh.indices[t]),
-                                      decoded_height_m(mesh, mesh.indices[t + 1]),
-                                      decoded_height_m(mesh, mesh.indices[t + 2]));
-    const auto row_of = [&grid](double v) {
-      const auto it = std::lower_bound(grid.v_exact.begin(), grid.v_exact.end(), v);
-      return static_cast<std::int32_t>(it - grid.v_exact.begin());
-    };
-    const std::int32_t j_first = row_of(std::min({a.y, b.y, c.y}) - kMargin);
-    const std::int32_t j_last =
-        std::min(kTileIntervals, row_of(std::max({a.y, b.y, c.y}) + kMargin));
-    scan_triangle(grid, a, b, c, kMargin, j_first, j_last,
-                  [&](std::int32_t j, std::int32_t i_first, std::int32_t i_last) {
-                    const double v = grid.v_exact[static_cast<std::size_t>(j)];
-                    for (std::int32_t i = i_first; i <= i_last; ++i) {
-                      surface[static_cast<std::size_t>(tile_post_index(i, j))] =
-                          plane.at(grid.u_exact[static_cast<std::size_t>(i)], v);
-                    }
-                  });
+Surface surface_of(const PostGrid& grid, const QuantizedMesh& mesh) {
+  Surface surface;
+  surface.indices = mesh.indices;
+  for (std::size_t k = 0; k < mesh.vertex_count(); ++k) {
+    surface.places.push_back({mesh.u[k], mesh.v[k]});
+    surface.heights_m.push_back(decoded_height_m(mesh, k));
+    surface.posts.push_back(post_at(grid, surface.places.back()));
   }
   return surface;
 }
 
-void place_vertices(const PostGrid& grid, const QuantizedMesh& mesh, std::vector<double>& surface) {
-  for (std::size_t k = 0; k < mesh.vertex_count(); ++k) {
-    const auto column = std::lower_bound(grid.u.begin(), grid.u.end(), mesh.u[k]);
-    const auto row = std::lower_bound(grid.v.begin(), grid.v.end(), mesh.v[k]);
-    if (column == grid.u.end() || *column != mesh.u[k]) continue;
-    if (row == grid.v.end() || *row != mesh.v[k]) continue;
-    const auto i = static_cast<std::int32_t>(column - grid.u.begin());
-    const auto j = static_cast<std::int32_t>(row - grid.v.begin());
-    surface[static_cast<std::size_t>(tile_post_index(i, j))] = decoded_height_m(mesh, k);
+Surface surface_of(const Tin& tin) {
+  Surface surface;
+  surface.indices = tin.indices;
+  for (const TinVertex& vertex : tin.vertices) {
+    surface.places.push_back({vertex.u, vertex.v});
+    surface.heights_m.push_back(vertex.height_m);
+    surface.posts.push_back(vertex.post);
   }
+  return surface;
+}
+
+// NaN where no triangle is.
+std::vector<double> heights_at_posts(const PostGrid& grid, const Surface& surface) {
+  std::vector<double> heights(grid.post_count(), std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t t = 0; t + 2 < surface.indices.size(); t += 3) {
+    const std::size_t vertices[3] = {surface.indices[t], surface.indices[t + 1],
+                                     surface.indices[t + 2]};
+    const IntPoint a = surface.places[vertices[0]];
+    const IntPoint b = surface.places[vertices[1]];
+    const IntPoint c = surface.places[vertices[2]];
+    if (orientation(a, b, c) <= 0) continue;
+    const Plane plane =
+        plane_through(a, b, c, surface.heights_m[vertices[0]], surface.heights_m[vertices[1]],
+                      surface.heights_m[vertices[2]]);
+    const PostRows rows = rows_of_triangle(grid, a, b, c, kMargin);
+    scan_triangle(grid, a, b, c, kMargin, rows.first, rows.last,
+                  [&](std::int32_t j, std::int32_t i_first, std::int32_t i_last) {
+                    const double v = grid.v_exact[static_cast<std::size_t>(j)];
+                    for (std::int32_t i = i_first; i <= i_last; ++i) {
+                      heights[static_cast<std::size_t>(grid.index(i, j))] =
+                          plane.at(grid.u_exact[static_cast<std::size_t>(i)], v);
+                    }
+                  });
+  }
+  return heights;
+}
+
+ErrorSummary measure(const PostGrid& grid, const Surface& surface, std::span<const float> heights_m,
+                     std::span<const std::uint8_t> valid) {
+  QMPIPE_CHECK(heights_m.size() == grid.post_count() && valid.size() == grid.post_count());
+  std::vector<double> heights = heights_at_posts(grid, surface);
+  for (std::size_t k = 0; k < surface.posts.size(); ++k) {
+    if (surface.posts[k] == kNoPost) continue;
+    heights[static_cast<std::size_t>(surface.posts[k])] = surface.heights_m[k];
+  }
+  ErrorSummary summary;
+  for (std::size_t k = 0; k < heights.size(); ++k) {
+    if (valid[k] == 0 || std::isnan(heights[k])) continue;
+    const double error_m = std::abs(heights[k] - static_cast<double>(heights_m[k]));
+    ++summary.posts;
+    summary.sum_m += error_m;
+    summary.sum_of_squares_m2 += error_m * error_m;
+    if (error_m > summary.largest_m) {
+      summary.largest_m = error_m;
+      const auto post = static_cast<std::int32_t>(k);
+      summary.worst = {.i = grid.column(post), .j = grid.row(post)};
+    }
+  }
+  return summary;
 }
 
 }  // namespace
@@ -79,23 +123,12 @@ double ErrorSummary::rms_m() const {
 
 ErrorSummary measure_error(const PostGrid& grid, const QuantizedMesh& mesh,
                            std::span<const float> heights_m, std::span<const std::uint8_t> valid) {
-  QMPIPE_CHECK(heights_m.size() == kTilePostCount && valid.size() == kTilePostCount);
-  std::vector<double> surface = surface_at_posts(grid, mesh);
-  place_vertices(grid, mesh, surface);
-  ErrorSummary summary;
-  for (std::size_t k = 0; k < kTilePostCount; ++k) {
-    if (valid[k] == 0 || std::isnan(surface[k])) continue;
-    const double error_m = std::abs(surface[k] - static_cast<double>(heights_m[k]));
-    ++summary.posts;
-    summary.sum_m += error_m;
-    summary.sum_of_squares_m2 += error_m * error_m;
-    if (error_m > summary.largest_m) {
-      summary.largest_m = error_m;
-      const auto post = static_cast<std::int32_t>(k);
-      summary.worst = {.i = post % kTilePosts, .j = post / kTilePosts};
-    }
-  }
-  return summary;
+  return measure(grid, surface_of(grid, mesh), heights_m, valid);
+}
+
+ErrorSummary measure_error(const PostGrid& grid, const Tin& tin, std::span<const float> heights_m,
+                           std::span<const std::uint8_t> valid) {
+  return measure(grid, surface_of(tin), heights_m, valid);
 }
 
 }  // namespace qmpipe

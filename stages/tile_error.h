@@ -1,4 +1,5 @@
-// The vertical error of a decoded tile against its zoom's posts: the measure of DESIGN 4.3.
+// The vertical error of a decoded tile against its zoom's posts, and of a TIN against those it was
+// made from: the measure of DESIGN 4.3.
 //
 // A post that is a vertex is judged where the file puts the vertex (half a quantized unit from its
 // exact place at most); every other post at its exact place on the surface.
@@ -16,7 +17,7 @@ struct ErrorSummary {
   double largest_m = 0;
   double sum_m = 0;  // of magnitudes
   double sum_of_squares_m2 = 0;
-  Post worst;  // of the tile, where largest_m was found first (lowest index)
+  Post worst;  // of the grid, where largest_m was found first (lowest index)
 
   void add(const ErrorSummary& other);
   double mean_m() const;
@@ -27,5 +28,9 @@ struct ErrorSummary {
 // covers (a damaged tile of another program) are not counted.
 ErrorSummary measure_error(const PostGrid& grid, const QuantizedMesh& mesh,
                            std::span<const float> heights_m, std::span<const std::uint8_t> valid);
+
+// The same for a TIN. REQUIRES: heights_m and valid of grid.post_count().
+ErrorSummary measure_error(const PostGrid& grid, const Tin& tin, std::span<const float> heights_m,
+                           std::span<const std::uint8_t> valid);
 
 }  // namespace qmpipe

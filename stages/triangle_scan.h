@@ -44,6 +44,21 @@ struct EdgeBound {
 };
 }  // namespace detail
 
+// The rows of posts between the lowest and the highest corner.
+struct PostRows {
+  std::int32_t first = 0;
+  std::int32_t last = 0;
+};
+inline PostRows rows_of_triangle(const PostGrid& grid, const IntPoint& a, const IntPoint& b,
+                                 const IntPoint& c, double margin) {
+  const auto row_of = [&grid](double v) {
+    const auto it = std::lower_bound(grid.v_exact.begin(), grid.v_exact.end(), v);
+    return static_cast<std::int32_t>(it - grid.v_exact.begin());
+  };
+  return {.first = row_of(std::min({a.y, b.y, c.y}) - margin),
+          .last = std::min(grid.height_posts - 1, row_of(std::max({a.y, b.y, c.y}) + margin))};
+}
+
 // Calls row(j, i_first, i_last) for every row with posts of the counter-clockwise triangle abc in
 // it, rows ascending. Only rows j_first..j_last are looked at: pass the rows of the triangle's
 // lowest and highest corner where they are known, else 0 and 256.

@@ -49,11 +49,11 @@ class Cli(unittest.TestCase):
     def test_help_names_every_command(self):
         done = run("--help")
         self.assertEqual(done.returncode, 0)
-        for command in ("build", "verify", "compare", "info", "synth"):
+        for command in ("build", "verify", "compare", "info", "tin", "synth"):
             self.assertIn(command, done.stdout)
 
     def test_each_command_has_help_with_an_example(self):
-        for command in ("build", "verify", "compare", "info", "synth"):
+        for command in ("build", "verify", "compare", "info", "tin", "synth"):
             done = run(command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("qmpipe " + command, done.stdout)
@@ -93,10 +93,59 @@ class Cli(unittest.TestCase):
         tile = max(self.tiles.glob("*/*/*.terrain"), key=lambda p: p.stat().st_size)
         done = run("info", tile)
         self.assertEqual(done.returncode, 0, done.stderr)
-        for name in ("tile.ply", "tile.obj", "tile.glb"):
+        for name in ("tile.ply", "tile.obj", "tile.glb", "tile.stl"):
             done = run("info", tile, "--mesh", self.root / name)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertGreater((self.root / name).stat().st_size, 500)
+
+    def test_tin_writes_one_mesh_and_its_errors(self):
+        for name in ("tin.ply", "tin.obj", "tin.glb", "tin.stl"):
+            done = run("tin", self.dem, "-o", self.root / name, "--tolerance", "20", "--json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            report = json.loads(done.stdout)
+            self.assertEqual(report["file_bytes"], (self.root / name).stat().st_size)
+            self.assertEqual((report["columns"], report["rows"]), (400, 300))
+            self.assertEqual(report["posts"], 400 * 300)
+            self.assertLessEqual(report["largest_error_m"], 20)
+            self.assertLessEqual(report["mean_error_m"], report["rms_error_m"])
+            self.assertEqual(report["triangles"] / (2 * 399 * 299),
+                             report["share_of_grid_triangles"])
+        stl = (self.root / "tin.stl").read_bytes()
+        self.assertEqual(int.from_bytes(stl[80:84], "little"), report["triangles"])
+        first = (self.root / "tin.ply").read_bytes()
+        done = run("tin", self.dem, "-o", self.root / "tin.ply", "--param", "g_e=20", "-v")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual((self.root / "tin.ply").read_bytes(), first)
+        self.assertRegex(done.stderr, r"(?m)^  g_e +20 ")
+        self.assertRegex(done.stdout, r"(?m)^largest error +\d+\.\d+ m, at column \d+, row \d+$")
+
+    def test_tin_of_so_many_triangles_in_the_coordinates_of_the_crs(self):
+        obj = self.root / "crs.obj"
+        done = run("tin", self.dem, "-o", obj, "--triangles", "500", "--frame", "crs")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = obj.read_text().splitlines()
+        self.assertIn(sum(line.startswith("f ") for line in lines), (499, 500))
+        longitudes = [float(line.split()[1]) for line in lines if line.startswith("v ")]
+        self.assertAlmostEqual(min(longitudes), 6 + 0.5 / 400)
+        self.assertAlmostEqual(max(longitudes), 7 - 0.5 / 400)
+
+    def test_tin_refuses_with_the_remedy(self):
+        out = self.root / "refused.ply"
+        self.fails(2, "tin", self.dem, "-o", self.root / "refused.off", says=[".stl"])
+        self.fails(2, "tin", self.dem, "-o", self.root / "refused.glb", "--frame", "crs",
+                   says=[".ply"])
+        self.fails(2, "tin", self.dem, "-o", out, "--tolerance", "1", "--triangles", "9",
+                   says=["not both"])
+        self.fails(2, "tin", self.dem, "-o", out, "--tolerance", "1", "--param", "g_e=2",
+                   says=["g_e"])
+        self.fails(2, "tin", self.dem, "-o", out, "--tolerance", "1", "--stop", "edges",
+                   "--method", "edge-collapse", says=["--stop edges"])
+        self.fails(2, "tin", self.dem, "-o", out, "--memory", "2M", says=["-outsize"])
+        self.fails(2, "tin", self.dem, "-o", out, "--method", "magic", says=["greedy"])
+        self.fails(2, "tin", "-o", out)
+        self.fails(1, "tin", self.root / "nowhere.tif", "-o", out, says=["nowhere.tif"])
+        self.fails(1, "tin", self.dem, "-o", self.root / "none" / "x.ply", says=["no folder"])
+        self.assertFalse(out.exists())
 
     def test_json_run_is_json_throughout(self):
         done = run("build", self.dem, "-o", self.root / "json", "--json", "--overwrite")

@@ -143,9 +143,51 @@ TEST(MeshExport, GlbIsAWholeGltfWithYUp) {
   EXPECT_EQ(data_of(primitive["attributes"]["NORMAL"]).first["count"], 4);
 }
 
+TEST(MeshExport, StlHasEveryTriangleWithItsNormal) {
+  const TemporaryFolder folder;
+  ExportMesh mesh = two_triangles();
+  mesh.positions_m.push_back(mesh.positions_m[3]);
+  mesh.normals.push_back({0, 0, 1});
+  mesh.indices.insert(mesh.indices.end(), {0, 3, 4});  // without area
+  write_mesh_file(folder.path() / "m.Stl", mesh);
+  const std::string bytes = folder.get("m.Stl");
+  ASSERT_EQ(bytes.size(), 84U + 3 * 50);
+  EXPECT_FALSE(bytes.starts_with("solid"));
+  EXPECT_EQ(number_at<std::uint32_t>(bytes, 80), 3U);
+  std::size_t at = 84;
+  for (std::size_t t = 0; t < 3; ++t) {
+    std::array<std::array<double, 3>, 4> vectors{};  // the normal and the corners
+    for (auto& vector : vectors) {
+      for (double& value : vector) {
+        value = number_at<float>(bytes, at);
+        at += 4;
+      }
+    }
+    EXPECT_EQ(number_at<std::uint16_t>(bytes, at), 0);
+    at += 2;
+    const auto& n = vectors[0];
+    const double wanted_length = t < 2 ? 1 : 0;
+    EXPECT_NEAR(n[0] * n[0] + n[1] * n[1] + n[2] * n[2], wanted_length, 1e-6);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3& corner = mesh.positions_m[mesh.indices[3 * t + k]];
+      double along = 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        EXPECT_EQ(vectors[k + 1][axis], static_cast<float>(corner[axis]));
+        along += n[axis] * (vectors[k + 1][axis] - vectors[1][axis]);
+      }
+      EXPECT_NEAR(along, 0, 1e-5);
+    }
+    // Both triangles are counter-clockwise from above.
+    if (t < 2) {
+      EXPECT_GT(n[2], 0);
+    }
+  }
+  EXPECT_EQ(at, bytes.size());
+}
+
 TEST(MeshExport, FaultsAreToldByKind) {
   const TemporaryFolder folder;
-  EXPECT_THROW(write_mesh_file(folder.path() / "m.stl", two_triangles()), UsageError);
+  EXPECT_THROW(write_mesh_file(folder.path() / "m.off", two_triangles()), UsageError);
   EXPECT_THROW(write_mesh_file(folder.path() / "m", two_triangles()), UsageError);
   folder.put("file", "x");
   EXPECT_THROW(write_mesh_file(folder.path() / "file/m.ply", two_triangles()), IoError);

@@ -83,7 +83,7 @@ void register_info(CLI::App& app, std::function<int()>& action) {
       command
           ->add_option("--mesh", arguments->mesh_path,
                        "Write the tile as a mesh instead; the name ends in .ply (binary, double), "
-                       ".obj (text) or .glb (float32, y up)")
+                       ".obj (text), .glb (float32, y up) or .stl (float32)")
           ->type_name("FILE")
           ->excludes(json);
   command

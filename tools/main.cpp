@@ -13,6 +13,7 @@
 #include "tools/command_compare.h"
 #include "tools/command_info.h"
 #include "tools/command_synth.h"
+#include "tools/command_tin.h"
 #include "tools/command_verify.h"
 
 namespace {
@@ -30,7 +31,7 @@ int fail(int code, const std::string& message) {
 int run(int argc, char** argv) {
   CLI::App app{
       "qmpipe turns digital elevation models of any size into quantized-mesh terrain pyramids for "
-      "web globes."};
+      "web globes, and single ones into TINs."};
   app.name("qmpipe");
   app.set_version_flag("--version", std::string("qmpipe ") + qmpipe::kProgramVersion);
   app.require_subcommand(1);
@@ -40,6 +41,7 @@ int run(int argc, char** argv) {
   qmpipe::register_verify(app, action);
   qmpipe::register_compare(app, action);
   qmpipe::register_info(app, action);
+  qmpipe::register_tin(app, action);
   qmpipe::register_synth(app, action);
   try {
     app.parse(argc, argv);

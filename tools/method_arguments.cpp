@@ -60,8 +60,10 @@ void add_method_options(CLI::App& command, MethodArguments& arguments) {
       ->type_name("FILE");
 }
 
-MethodChoice to_choice(const MethodArguments& arguments, const ShortForms& short_forms) {
+MethodChoice to_choice(const MethodArguments& arguments, const ShortForms& short_forms,
+                       const MethodParameters& defaults) {
   MethodChoice choice;
+  choice.parameters = defaults;
   choice.method = understood("--method", method_named(arguments.method));
   choice.stop = understood("--stop", stop_named(arguments.stop));
   if (choice.stop == Stop::kEdges && choice.method != Method::kEdgeCollapse) {

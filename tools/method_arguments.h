@@ -30,12 +30,13 @@ struct MethodChoice {
   MethodParameters parameters;
 };
 
-// Flags win over the file, the file over the defaults; `short_forms` are what other options of the
+// Flags win over the file, the file over `defaults`; `short_forms` are what other options of the
 // command say about parameters, and count as flags. Throws UsageError for what cannot be
 // understood, and for --param with a parameter that the method does not have (a file may list those of
 // all methods).
 using ShortForms = std::vector<std::pair<std::string, ZoomSeries>>;
-MethodChoice to_choice(const MethodArguments& arguments, const ShortForms& short_forms);
+MethodChoice to_choice(const MethodArguments& arguments, const ShortForms& short_forms,
+                       const MethodParameters& defaults = {});
 
 // "greedy", "edge-collapse by edges": how a choice is called in texts.
 std::string text_of(const MethodChoice& choice);
