@@ -1,12 +1,17 @@
 #include "stages/collapse_surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "scheduler/check.h"
 #include "stages/height_step.h"
 
 namespace qmpipe {
+namespace {
+std::uint8_t bit(Side side) { return static_cast<std::uint8_t>(1U << index_of(side)); }
+}  // namespace
 
 CollapseSurface::HeightRange CollapseSurface::height_range(const Tin& tin) {
   const auto [low, high] = std::minmax_element(
@@ -17,30 +22,42 @@ CollapseSurface::HeightRange CollapseSurface::height_range(const Tin& tin) {
 
 CollapseSurface::CollapseSurface(const PostGrid& grid, const Tin& tin, const FixedBorders& fixed,
                                  double height_step_m, const CollapseWeights& weights)
-    : grid_(&grid),
+    : grid_(grid),
       weights_(weights),
       height_step_m_(height_step_m),
       heights_(height_range(tin)),
       mesh_(tin.indices, tin.vertices.size()),
-      vertices_(tin.vertices),
-      sums_(tin.vertices.size()) {
+      vertices_(tin.vertices) {
   QMPIPE_CHECK(height_step_m > 0);
   scale_ = {1.0 / grid.u_max(), 1.0 / grid.v_max(),
             heights_.high_m > heights_.low_m ? 1 / (heights_.high_m - heights_.low_m) : 0.0};
-  const auto bit = [](Side side) { return static_cast<std::uint8_t>(1U << index_of(side)); };
   for (const Side side : kSides) {
     if (fixed[index_of(side)]) fixed_sides_ |= bit(side);
   }
+  start();
+}
+
+void CollapseSurface::start() {
+  sides_.clear();
+  places_.clear();
   for (const TinVertex& vertex : vertices_) {
     std::uint8_t sides = 0;
     if (vertex.u == 0) sides |= bit(Side::kWest);
     if (vertex.v == 0) sides |= bit(Side::kSouth);
-    if (vertex.u == grid.u_max()) sides |= bit(Side::kEast);
-    if (vertex.v == grid.v_max()) sides |= bit(Side::kNorth);
+    if (vertex.u == grid_.u_max()) sides |= bit(Side::kEast);
+    if (vertex.v == grid_.v_max()) sides |= bit(Side::kNorth);
     sides_.push_back(sides);
     places_.push_back(scaled(vertex));
   }
+  sums_.resize(vertices_.size());
   for (Index v = 0; v < mesh_.vertex_count(); ++v) update_sums(v);
+}
+
+void CollapseSurface::compact() {
+  Tin left = tin();
+  mesh_ = CollapseMesh(left.indices, left.vertices.size());
+  vertices_ = std::move(left.vertices);
+  start();
 }
 
 void CollapseSurface::update_sums(Index v) {
@@ -114,8 +131,8 @@ TinVertex CollapseSurface::rounded(const Vector3& place) const {
   const double height_m = scale_.z > 0 ? std::clamp(heights_.low_m + place.z / scale_.z,
                                                     heights_.low_m, heights_.high_m)
                                        : heights_.low_m;
-  return {.u = units(place.x, grid_->u_max()),
-          .v = units(place.y, grid_->v_max()),
+  return {.u = units(place.x, grid_.u_max()),
+          .v = units(place.y, grid_.v_max()),
           .post = kNoPost,
           .height_m = snapped_height(height_m, height_step_m_)};
 }

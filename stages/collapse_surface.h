@@ -8,7 +8,8 @@
 // that are multiples of the step within the range of the first TIN's.
 #pragma once
 
-#include <array>
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "stages/collapse_mesh.h"
@@ -55,6 +56,9 @@ class CollapseSurface {
   template <class Each>
   bool each_new_triangle(Index e, Index kept, const Each& each) const;
 
+  // Moves what is left together, numbered anew in the same order, with sums computed anew. The scaled
+  // coordinates and the range of heights stay those of the first TIN.
+  void compact();
   // What is left, without gaps, in the order of the first TIN.
   Tin tin() const;
 
@@ -71,6 +75,7 @@ class CollapseSurface {
             (vertex.height_m - heights_.low_m) * scale_.z};
   }
   bool is_corner(Index v) const { return (sides_[at(v)] & (sides_[at(v)] - 1U)) != 0; }
+  void start();
   void update_sums(Index v);
   // Adds what v contributes to its neighbours' sums, `other`'s excepted: factor 1, or -1 to take it out.
   void add_to_ring(Index v, Index other, double factor);
@@ -88,7 +93,7 @@ class CollapseSurface {
   Candidate candidate(Index e, const Plan& plan) const;
   TinVertex rounded(const Vector3& place) const;
 
-  const PostGrid* grid_;
+  const PostGrid& grid_;
   CollapseWeights weights_;
   double height_step_m_;
   HeightRange heights_;

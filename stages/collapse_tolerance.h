@@ -5,6 +5,11 @@
 // are a neighbour's and do not count.
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
 #include "stages/collapse_surface.h"
 #include "stages/post_errors.h"
 

@@ -22,14 +22,12 @@ class EdgeCollapse {
  public:
   EdgeCollapse(const PostGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
                const EdgeCollapseOptions& options)
-      : grid_(grid),
-        fixed_(fixed),
-        options_(options),
-        weights_{.volume = options.volume_weight,
-                 .boundary = options.boundary_weight,
-                 .shape = options.shape_weight},
+      : options_(options),
         surface_(grid, base_tin(grid, heights_m, fixed, options.height_step_m), fixed,
-                 options.height_step_m, weights_) {
+                 options.height_step_m,
+                 {.volume = options.volume_weight,
+                  .boundary = options.boundary_weight,
+                  .shape = options.shape_weight}) {
     if (options.tolerance_m) {
       tolerance_.emplace(grid, heights_m, *options.tolerance_m, options.height_step_m,
                          options.curvature, surface_, fixed);
@@ -49,7 +47,7 @@ class EdgeCollapse {
         collapse_otherwise(next);
       }
       if (surface_.mesh().triangle_count() < round_end_) {
-        surface_ = CollapseSurface(grid_, surface_.tin(), fixed_, options_.height_step_m, weights_);
+        surface_.compact();
         start_round();
       }
     }
@@ -126,10 +124,7 @@ class EdgeCollapse {
     });
   }
 
-  const PostGrid& grid_;
-  const FixedBorders& fixed_;
   const EdgeCollapseOptions& options_;
-  CollapseWeights weights_;
   CollapseSurface surface_;
   std::optional<CollapseTolerance> tolerance_;
   CollapseQueue queue_;
