@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <limits>
 #include <memory>
 
 #include "formats/errors.h"
@@ -56,9 +57,11 @@ void require_sound(const SingleTinOptions& options) {
   if (target.tolerance_m && !(*target.tolerance_m > 0)) {
     throw UsageError(fmt::format("--tolerance {:g}: give metres above 0", *target.tolerance_m));
   }
-  if (target.most_triangles && *target.most_triangles < 2) {
-    throw UsageError(
-        fmt::format("--triangles {}: a rectangle takes 2 at least", *target.most_triangles));
+  constexpr std::int64_t kMostTriangles = std::numeric_limits<std::int32_t>::max();
+  if (target.most_triangles &&
+      (*target.most_triangles < 2 || *target.most_triangles > kMostTriangles)) {
+    throw UsageError(fmt::format("--triangles {}: give 2 (a rectangle takes no fewer) to {}",
+                                 *target.most_triangles, kMostTriangles));
   }
   if (target.tolerance_m && options.stop == Stop::kEdges) {
     throw UsageError(

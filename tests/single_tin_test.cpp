@@ -347,7 +347,8 @@ TEST(SingleTin, WhatCannotBeDoneIsRefusedWithTheRemedy) {
   EXPECT_THAT(refused(hills(13), {.tolerance_m = 1, .most_triangles = 9}), HasSubstr("not both"));
   EXPECT_THAT(refused(hills(13), {.tolerance_m = 0}), HasSubstr("above 0"));
   EXPECT_THAT(refused(hills(13), {.tolerance_m = 1e-7}), HasSubstr("or more"));
-  EXPECT_THAT(refused(hills(13), {.most_triangles = 1}), HasSubstr("2 at least"));
+  EXPECT_THAT(refused(hills(13), {.most_triangles = 1}), HasSubstr("give 2"));
+  EXPECT_THAT(refused(hills(13), {.most_triangles = 1LL << 40}), HasSubstr("give 2"));
   EXPECT_THAT(refusal([&] {
                 make_single_tin({.input = written(folder, hills(13)), .memory_bytes = 1 << 20});
               }),
