@@ -1,12 +1,15 @@
 // The options that choose a simplification method, the same for every command that has one.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "pipeline/method.h"
+
+namespace CLI {
+class App;
+}
 
 namespace qmpipe {
 

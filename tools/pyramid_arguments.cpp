@@ -1,5 +1,6 @@
 #include "tools/pyramid_arguments.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <thread>
 

@@ -2,11 +2,15 @@
 // machine it may take.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "pipeline/build_options.h"
 #include "tools/method_arguments.h"
+
+namespace CLI {
+class App;
+}
 
 namespace qmpipe {
 
