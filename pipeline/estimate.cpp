@@ -17,6 +17,7 @@ namespace qmpipe {
 namespace {
 
 constexpr std::size_t kTilesPerSample = 50;
+constexpr std::size_t kFewTiles = 10;
 constexpr std::size_t kFewest = 2;
 constexpr std::size_t kMost = 6;
 
@@ -46,8 +47,10 @@ void measure(Sample& sample, const TileBuilder& builder, const std::optional<int
 std::vector<Sample> choose_samples(const BuildPlan& plan) {
   std::vector<Sample> samples;
   for (const auto& keys : plan.keys) {
+    if (keys.empty()) continue;
+    // A method that takes a second for a tile would else estimate a small set as long as build it.
     const std::size_t count =
-        std::min(keys.size(), std::clamp(keys.size() / kTilesPerSample, kFewest, kMost));
+        keys.size() < kFewTiles ? 1 : std::clamp(keys.size() / kTilesPerSample, kFewest, kMost);
     for (std::size_t k = 0; k < count; ++k) {
       samples.push_back({.key = keys[(2 * k + 1) * keys.size() / (2 * count)]});
     }

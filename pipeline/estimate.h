@@ -29,7 +29,7 @@ struct Estimate {
   std::int32_t sampling_zoom = 0;
 };
 
-// Meshes two to six tiles of each zoom, evenly spaced, without their neighbours' borders, on the
+// Meshes one to six tiles of each zoom, evenly spaced, without their neighbours' borders, on the
 // run's threads.
 Estimate estimate_build(const BuildOptions& options, const BuildPlan& plan,
                         const Heightfield& heightfield, const MemoryPlan& memory);

@@ -154,7 +154,20 @@ MethodOptions method_options(Method method, Stop stop, const ParameterValues& va
   return point_set_options(method, named, frame);
 }
 
-std::int64_t simplify_bytes(Method method) { return method == Method::kGreedy ? 0 : 48LL << 20U; }
+std::int64_t simplify_bytes(Method method) {
+  switch (method) {
+    case Method::kGreedy:
+      return 0;
+    case Method::kEdgeCollapse:
+      return 40LL << 20U;
+    case Method::kPsRandom:
+    case Method::kPsGrid:
+    case Method::kPsHierarchy:
+    case Method::kPsWlop:
+      break;
+  }
+  return 32LL << 20U;
+}
 
 namespace {
 Tin simplify_with(const PostGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,

@@ -1,5 +1,7 @@
 #include "stages/edge_collapse.h"
 
+#include <limits>
+
 #include "scheduler/check.h"
 #include "stages/base_tin.h"
 #include "stages/collapse_queue.h"
@@ -137,6 +139,8 @@ class EdgeCollapse {
 Tin edge_collapse(const PostGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
                   const EdgeCollapseOptions& options) {
   QMPIPE_CHECK(heights_m.size() == grid.post_count());
+  // Half-edges have 32-bit numbers.
+  QMPIPE_CHECK(grid.post_count() < std::numeric_limits<Index>::max() / 6);
   return EdgeCollapse(grid, heights_m, fixed, options).run();
 }
 

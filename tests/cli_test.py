@@ -325,12 +325,12 @@ class Cli(unittest.TestCase):
 
     def test_compare_writes_a_report(self):
         out = self.root / "report"
-        done = run("compare", self.dem, "-o", out, "--methods", "greedy,edge-collapse:edges,ps-grid",
+        done = run("compare", self.dem, "-o", out, "--methods", "greedy,ps-hierarchy,ps-grid",
                    "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
         numbers = json.loads(done.stdout)
         self.assertEqual([m["method"] for m in numbers["methods"]],
-                         ["greedy", "edge-collapse:edges", "ps-grid"])
+                         ["greedy", "ps-hierarchy", "ps-grid"])
         self.assertEqual(sorted(p.name for p in out.iterdir()),
                          ["compare.json", "distances.csv", "index.html", "run_times.csv",
                           "single_tile.csv", "zooms.csv"])

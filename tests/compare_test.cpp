@@ -42,8 +42,7 @@ class CompareTest : public testing::BuildTest {
 };
 
 TEST_F(CompareTest, NumbersAreThoseOfTheBuildsAndOfTheirVerification) {
-  const Comparison comparison =
-      compare(without_voids(), {"greedy", "edge-collapse:edges", "ps-grid"});
+  const Comparison comparison = compare(without_voids(), {"greedy", "ps-hierarchy", "ps-grid"});
   ASSERT_EQ(comparison.methods.size(), 3U);
   ASSERT_TRUE(comparison.tile.has_value());
   for (const ComparedMethod& method : comparison.methods) {

@@ -8,6 +8,7 @@
 
 #include "formats/errors.h"
 #include "tests/temporary_folder.h"
+#include "tests/terrain_fixture.h"
 
 namespace qmpipe {
 namespace {
@@ -126,6 +127,30 @@ TEST(MethodParameters, ValuesReachTheStages) {
   EXPECT_EQ(points.cluster_size, 9);
   EXPECT_EQ(points.seed, 5U);
   EXPECT_EQ(std::get<GreedyOptions>(options(Method::kGreedy, Stop::kTolerance)).tolerance_m, 15000);
+}
+
+// Small enough for the sanitizers, which leave the methods' own property tests out.
+TEST(Simplify, EveryMethodMakesASoundTileWithInheritedBorders) {
+  const PostGrid tile = make_tile_grid(TilingScheme(Projection::kMercator), {6, 20, 41});
+  const PostGrid plane = make_plane_grid(31, 22, 30, 25);
+  for (const Method method : kMethods) {
+    SCOPED_TRACE(name_of(method) + ", seed 11");
+    std::mt19937_64 random(11);
+    const auto heights_m = testing::random_terrain(testing::Terrain::kRidges, random);
+    const FixedBorders fixed = testing::random_borders(random, 5);
+    const MethodOptions options = method_options(
+        method, Stop::kTolerance, values_at(MethodParameters(), method, Stop::kTolerance, 6),
+        {.height_step_m = 1, .curvature = Curvature::kCounts, .seed = 3});
+    const Tin tin = simplify(tile, heights_m, fixed, options);
+    EXPECT_EQ(testing::fault_of(tile, tin), "");
+    EXPECT_LT(tin.vertices.size(), kTilePostCount / 2);
+    for (const Side side : kSides) {
+      const auto& mask = fixed[index_of(side)];
+      EXPECT_TRUE(!mask || border_of(tin, side) == *mask) << name_of(side);
+    }
+    const auto small = std::span(heights_m).first(plane.post_count());
+    EXPECT_EQ(testing::fault_of(plane, simplify(plane, small, {}, options)), "");
+  }
 }
 
 class ParameterFile : public ::testing::Test {

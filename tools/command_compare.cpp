@@ -85,7 +85,7 @@ CompareOptions to_options(const CompareArguments& arguments) {
   options.build.run.checkpoint_s = 0;
   MethodParameters& parameters = options.build.mesh.parameters;
   if (!arguments.parameter_file.empty()) read_parameter_file(arguments.parameter_file, parameters);
-  for (const auto& [name, series] : short_forms(arguments.pyramid)) parameters.set(name, series);
+  for (const ShortForm& form : short_forms(arguments.pyramid)) set_parameter(form, parameters);
   for (const std::string& text : arguments.parameters) {
     const auto [name, series] = parse_parameter(text);
     parameters.set(name, series);

@@ -25,11 +25,9 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kFooter =
     "Without --tolerance and --triangles the method's parameters decide. Their defaults here are\n"
     "those of Campos et al. 2020 for single DEMs (Table 2): g_e=5 g_g=0 e_e=2000 p_e=100 p_b=5\n"
-    "p_m=10 r_r=98.5 d_g=1000 h_c=150 h_v=1e-4 w_p=1.5 w_r=25 w_i=15; a series by zoom counts "
-    "with\n"
-    "its value at zoom 0. Unless they are given, p_e is the tolerance with --tolerance, and h_v "
-    "is\n"
-    "1/3 with --triangles, so that h_c alone decides.\n"
+    "p_m=10 r_r=98.5 d_g=1000 h_c=150 h_v=1e-4 w_p=1.5 w_r=25 w_i=15; of a series by zoom the\n"
+    "value at zoom 0 counts. Unless they are given, p_e is the tolerance with --tolerance, and\n"
+    "h_v is 1/3 with --triangles, so that h_c alone decides.\n"
     "Voids are left out of the mesh; errors are those of valid posts. Same input, same bytes.\n"
     "An existing MESH is replaced.\n"
     "\n"
@@ -72,7 +70,7 @@ SingleTinOptions to_options(const TinArguments& arguments) {
   ShortForms short_forms;
   if (arguments.tolerance_given) {
     options.target.tolerance_m = arguments.tolerance_m;
-    short_forms.emplace_back("g_e", ZoomSeries({arguments.tolerance_m}));
+    short_forms.push_back({"--tolerance", "g_e", ZoomSeries({arguments.tolerance_m})});
     // Borders and sharp edges would else be coarser than the tolerance whatever is left of the rest.
     options.parameters.set("p_e", ZoomSeries({arguments.tolerance_m}));
   }

@@ -61,6 +61,14 @@ void add_method_options(CLI::App& command, MethodArguments& arguments) {
       ->type_name("FILE");
 }
 
+void set_parameter(const ShortForm& form, MethodParameters& parameters) {
+  try {
+    parameters.set(form.parameter, form.series);
+  } catch (const UsageError& error) {
+    throw UsageError(std::string(form.option) + ": " + error.what());
+  }
+}
+
 MethodChoice to_choice(const MethodArguments& arguments, const ShortForms& short_forms,
                        const MethodParameters& defaults) {
   MethodChoice choice;
@@ -73,10 +81,10 @@ MethodChoice to_choice(const MethodArguments& arguments, const ShortForms& short
   if (!arguments.parameter_file.empty()) {
     read_parameter_file(arguments.parameter_file, choice.parameters);
   }
-  for (const auto& [name, series] : short_forms) {
-    choice.parameters.set(name, series);
+  for (const ShortForm& form : short_forms) {
+    set_parameter(form, choice.parameters);
     // g_e sets how fine heights are, whatever the method.
-    if (name != "g_e") require_parameter(choice, name, "--grid");
+    if (form.parameter != "g_e") require_parameter(choice, form.parameter, form.option);
   }
   for (const std::string& text : arguments.parameters) set_by_flag(text, choice);
   return choice;

@@ -37,7 +37,13 @@ struct MethodChoice {
 // command say about parameters, and count as flags. Throws UsageError for what cannot be
 // understood, and for --param with a parameter that the method does not have (a file may list those of
 // all methods).
-using ShortForms = std::vector<std::pair<std::string, ZoomSeries>>;
+struct ShortForm {
+  const char* option;  // "--tolerance"
+  std::string parameter;
+  ZoomSeries series;
+};
+using ShortForms = std::vector<ShortForm>;
+void set_parameter(const ShortForm& form, MethodParameters& parameters);
 MethodChoice to_choice(const MethodArguments& arguments, const ShortForms& short_forms,
                        const MethodParameters& defaults = {});
 

@@ -100,8 +100,10 @@ BuildOptions to_build_options(const PyramidArguments& arguments) {
 
 ShortForms short_forms(const PyramidArguments& arguments) {
   ShortForms forms;
-  if (arguments.tolerance_m) forms.emplace_back("g_e", ZoomSeries({*arguments.tolerance_m}, 0.5));
-  if (arguments.grid_cells) forms.emplace_back("g_g", ZoomSeries({*arguments.grid_cells}));
+  if (arguments.tolerance_m) {
+    forms.push_back({"--tolerance", "g_e", ZoomSeries({*arguments.tolerance_m}, 0.5)});
+  }
+  if (arguments.grid_cells) forms.push_back({"--grid", "g_g", ZoomSeries({*arguments.grid_cells})});
   return forms;
 }
 
