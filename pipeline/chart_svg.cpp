@@ -37,7 +37,8 @@ class Axis {
   std::vector<double> ticks() const {
     std::vector<double> ticks;
     if (scale_ == Scale::kLogarithmic) {
-      for (double power = std::floor(low_); power <= high_; ++power) {
+      const auto last = static_cast<int>(std::floor(high_));
+      for (auto power = static_cast<int>(std::floor(low_)); power <= last; ++power) {
         for (const double digit : {1.0, 2.0, 5.0}) add_within(digit * std::pow(10, power), ticks);
       }
       return ticks;
@@ -45,8 +46,9 @@ class Axis {
     const double raw = (high_ - low_) / 5;
     const double power = std::pow(10, std::floor(std::log10(raw)));
     const double step = power * (raw / power < 1.5 ? 1 : raw / power < 3.5 ? 2 : 5);
-    for (double value = std::ceil(low_ / step) * step; value <= high_; value += step) {
-      ticks.push_back(std::abs(value) < step / 2 ? 0 : value);
+    const auto last = static_cast<int>(std::floor(high_ / step));
+    for (auto k = static_cast<int>(std::ceil(low_ / step)); k <= last; ++k) {
+      ticks.push_back(k * step);
     }
     return ticks;
   }

@@ -38,13 +38,14 @@ ComparedMethod build_and_measure(const CompareOptions& options, const ComparedCh
 
 // The most rugged tile without voids of the deepest zoom that has one; equal ones by key.
 std::optional<TileKey> choose_tile(const VerifyReport& report) {
-  for (auto zoom = report.zooms.rbegin(); zoom != report.zooms.rend(); ++zoom) {
+  std::optional<TileKey> chosen;
+  for (const ZoomReport& zoom : report.zooms) {
     const auto best = std::max_element(
-        zoom->measured.begin(), zoom->measured.end(),
+        zoom.measured.begin(), zoom.measured.end(),
         [](const MeasuredTile& a, const MeasuredTile& b) { return a.triangles < b.triangles; });
-    if (best != zoom->measured.end()) return best->key;
+    if (best != zoom.measured.end()) chosen = best->key;
   }
-  return std::nullopt;
+  return chosen;
 }
 
 TileTrial try_tile(const Recipe& recipe, const TileKey& key, std::span<const float> heights_m) {

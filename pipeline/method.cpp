@@ -129,7 +129,7 @@ bool has_error_bound(Method method, Stop stop) {
 
 std::vector<ParameterInfo> parameters_of(Method method, Stop stop) {
   std::vector<std::string_view> names = info_of(method).parameters;
-  if (method == Method::kEdgeCollapse) names.push_back(stop == Stop::kEdges ? "e_e" : "g_e");
+  if (method == Method::kEdgeCollapse) names.emplace_back(stop == Stop::kEdges ? "e_e" : "g_e");
   std::vector<ParameterInfo> parameters;
   for (const ParameterInfo& info : all_parameters()) {
     if (std::find(names.begin(), names.end(), info.name) != names.end()) parameters.push_back(info);
