@@ -15,6 +15,7 @@
 #include "pipeline/single_tin.h"
 #include "tools/method_arguments.h"
 #include "tools/parse_values.h"
+#include "tools/pyramid_arguments.h"
 
 namespace qmpipe {
 namespace {
@@ -274,12 +275,7 @@ void add_options(CLI::App& command, TinArguments& arguments) {
                   "CRS of the input, in place of its own (EPSG:32605, a .prj file, WKT). Without "
                   "any, coordinates are metres")
       ->type_name("CRS");
-  command
-      .add_option("--memory", arguments.memory,
-                  "Most memory for the whole process, such as 512M or 2G; 0: nine tenths of the "
-                  "machine's")
-      ->capture_default_str()
-      ->type_name("SIZE");
+  add_memory_option(command, arguments.memory);
   command.add_flag("--json", arguments.json, "Print the statistics as JSON");
   command.add_flag("-v,--verbose", arguments.verbose, "Print every effective option first");
   command.footer(kFooter);

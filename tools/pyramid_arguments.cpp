@@ -69,15 +69,19 @@ void add_machine_options(CLI::App& command, PyramidArguments& arguments) {
   RunOptions& run = arguments.options.run;
   run.threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
   command.add_option("--threads", run.threads, "Threads to work with (default: all cores)");
+  add_memory_option(command, arguments.memory);
+}
+
+}  // namespace
+
+void add_memory_option(CLI::App& command, std::string& size) {
   command
-      .add_option("--memory", arguments.memory,
+      .add_option("--memory", size,
                   "Most memory for the whole process, such as 512M or 2G; 0: nine tenths of the "
                   "machine's")
       ->capture_default_str()
       ->type_name("SIZE");
 }
-
-}  // namespace
 
 void add_pyramid_options(CLI::App& command, PyramidArguments& arguments) {
   add_input_options(command, arguments);

@@ -29,6 +29,8 @@ struct PyramidArguments {
   std::optional<double> grid_cells;
 };
 
+// --memory; to be read with parse_size().
+void add_memory_option(CLI::App& command, std::string& size);
 void add_pyramid_options(CLI::App& command, PyramidArguments& arguments);
 
 // All but the method, which to_choice() gives. Throws UsageError.
