@@ -62,7 +62,8 @@ struct SourceBlockCache::Impl {
   explicit Impl(std::int64_t bound) : bound_bytes(bound) {}
 
   bool let_go_of_oldest();
-  void make_room();
+  // For one more block.
+  void make_room(std::int64_t size_bytes);
 
   const std::int64_t bound_bytes;
   std::array<Shard, kShards> shards;
@@ -80,7 +81,7 @@ class SourceBlockCache::Impl::Claim {
       : cache_(cache), shard_(shard), key_(key), size_bytes_(size_bytes) {}
   ~Claim() {
     if (is_kept_) return;
-    cache_.held_bytes.fetch_sub(size_bytes_);
+    if (is_counted_) cache_.held_bytes.fetch_sub(size_bytes_);
     {
       const std::scoped_lock lock(shard_.mutex);
       shard_.erase(shard_.index.at(key_));
@@ -89,6 +90,12 @@ class SourceBlockCache::Impl::Claim {
   }
   Claim(const Claim&) = delete;
   Claim& operator=(const Claim&) = delete;
+
+  // Once there is room, and not before: a block that waits for room is not held.
+  void count() {
+    is_counted_ = true;
+    cache_.held_bytes.fetch_add(size_bytes_);
+  }
 
   void keep(std::shared_ptr<const Bytes> bytes, std::int64_t file_blocks) {
     is_kept_ = true;
@@ -109,6 +116,7 @@ class SourceBlockCache::Impl::Claim {
   Shard& shard_;
   BlockKey key_;
   std::int64_t size_bytes_;
+  bool is_counted_ = false;
   bool is_kept_ = false;
 };
 
@@ -159,8 +167,8 @@ bool SourceBlockCache::Impl::let_go_of_oldest() {
   return true;
 }
 
-void SourceBlockCache::Impl::make_room() {
-  while (held_bytes.load() > bound_bytes && let_go_of_oldest()) {
+void SourceBlockCache::Impl::make_room(std::int64_t size_bytes) {
+  while (held_bytes.load() + size_bytes > bound_bytes && let_go_of_oldest()) {
   }
 }
 
@@ -188,9 +196,9 @@ std::shared_ptr<const Bytes> SourceBlockCache::get(
     shard.entries.push_front({.key = key, .bytes = nullptr, .asked_at = impl_->clock.fetch_add(1)});
     shard.index.emplace(key, shard.entries.begin());
   }
-  impl_->held_bytes.fetch_add(request.size_bytes);
   Impl::Claim claim(*impl_, shard, key, request.size_bytes);
-  impl_->make_room();
+  impl_->make_room(request.size_bytes);
+  claim.count();
   auto bytes = std::make_shared<Bytes>(static_cast<std::size_t>(request.size_bytes));
   decode(*bytes);
   std::shared_ptr<const Bytes> result = std::move(bytes);

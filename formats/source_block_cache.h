@@ -52,7 +52,7 @@ class SourceBlockCache {
                                    const std::function<void(std::span<std::uint8_t>)>& decode);
 
   SourceReads reads() const;
-  // Of the blocks in the cache, in work, and about to be once there is room.
+  // Of the blocks in the cache and in work.
   std::int64_t memory_bytes() const;
 
  private:
