@@ -17,7 +17,7 @@ namespace {
 constexpr int kTrialRuns = 5;
 
 ComparedMethod build_and_measure(const CompareOptions& options, const ComparedChoice& choice,
-                                 Recipe& recipe, Progress& progress) {
+                                 Progress& progress) {
   BuildOptions build = options.build;
   build.mesh.method = choice.method;
   build.mesh.stop = choice.stop;
@@ -25,12 +25,12 @@ ComparedMethod build_and_measure(const CompareOptions& options, const ComparedCh
   build.output.overwrite = Overwrite::kYes;
   progress.note(fmt::format("{}: building", name_of(choice)));
   BuildResult built = build_pyramid(build, progress);
-  recipe = built.recipe;
   progress.note(fmt::format("{}: measuring", name_of(choice)));
   const VerifyOptions verify_options = {.sources = build.input.paths,
                                         .hausdorff = HausdorffMode::kMeasured,
                                         .threads = build.run.threads};
   return {.choice = choice,
+          .recipe = std::move(built.recipe),
           .build = std::move(built.report),
           .verify = verify(*open_tile_set(build.output.path), verify_options, progress),
           .trial = std::nullopt};
@@ -74,8 +74,7 @@ TileTrial try_tile(const Recipe& recipe, const TileKey& key, std::span<const flo
   return trial;
 }
 
-void try_all(const CompareOptions& options, const std::vector<Recipe>& recipes,
-             Comparison& comparison, Progress& progress) {
+void try_all(const CompareOptions& options, Comparison& comparison, Progress& progress) {
   comparison.tile = choose_tile(comparison.methods.front().verify);
   if (!comparison.tile) {
     progress.note("no tile is free of voids: there are no distances and no single-tile trials");
@@ -85,13 +84,13 @@ void try_all(const CompareOptions& options, const std::vector<Recipe>& recipes,
                                 .source_crs = options.build.input.source_crs,
                                 .threads = options.build.run.threads};
   const TilingScheme scheme(options.build.mesh.projection);
-  const auto posts = open_source_posts(source, scheme, recipes.front(), progress);
+  const auto posts = open_source_posts(source, scheme, comparison.methods.front().recipe, progress);
   const std::optional<WindowHeights> window = posts->posts(*comparison.tile);
   QMPIPE_CHECK(window.has_value());
   comparison.tile_heights_m = window->heights_m;
-  for (std::size_t k = 0; k < recipes.size(); ++k) {
+  for (ComparedMethod& method : comparison.methods) {
     progress.check_stop();
-    comparison.methods[k].trial = try_tile(recipes[k], *comparison.tile, comparison.tile_heights_m);
+    method.trial = try_tile(method.recipe, *comparison.tile, comparison.tile_heights_m);
   }
 }
 
@@ -123,12 +122,10 @@ Comparison compare_methods(const CompareOptions& options, Progress& progress) {
   comparison.inputs = options.build.input.paths;
   comparison.projection = options.build.mesh.projection;
   comparison.threads = options.build.run.threads;
-  std::vector<Recipe> recipes(options.methods.size());
-  for (std::size_t k = 0; k < options.methods.size(); ++k) {
-    comparison.methods.push_back(
-        build_and_measure(options, options.methods[k], recipes[k], progress));
+  for (const ComparedChoice& choice : options.methods) {
+    comparison.methods.push_back(build_and_measure(options, choice, progress));
   }
-  try_all(options, recipes, comparison, progress);
+  try_all(options, comparison, progress);
   return comparison;
 }
 

@@ -47,6 +47,7 @@ struct TileTrial {
 
 struct ComparedMethod {
   ComparedChoice choice;
+  Recipe recipe;
   BuildReport build;
   VerifyReport verify;
   std::optional<TileTrial> trial;

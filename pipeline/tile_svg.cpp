@@ -9,6 +9,7 @@
 #include "pipeline/svg.h"
 #include "scheduler/check.h"
 #include "stages/geodesy.h"
+#include "stages/metric_frame.h"
 
 namespace qmpipe {
 namespace {
@@ -20,19 +21,11 @@ constexpr double kReliefShare = 0.12;
 // One quad of the posts' picture covers so many intervals.
 constexpr std::int32_t kQuadIntervals = 2;
 
-double metres_per_u(const PostGrid& grid) {
-  if (!grid.on_globe()) return grid.metres_per_u;
-  const double middle_deg = (grid.latitude_deg.front() + grid.latitude_deg.back()) / 2;
-  const double width_deg = grid.longitude_deg.back() - grid.longitude_deg.front();
-  const double rad = std::numbers::pi / 180;
-  return kEquatorialRadiusM * std::cos(middle_deg * rad) * width_deg * rad / grid.u_max();
-}
-
 // Grey levels of slopes, and the shapes that have each.
 class Shading {
  public:
   Shading(const PostGrid& grid, double range_m)
-      : metres_per_u_(std::max(metres_per_u(grid), 1e-9)),
+      : metres_per_u_(std::max(flat_scale(grid).metres_per_u, 1e-9)),
         exaggeration_(range_m > 0 ? kReliefShare * metres_per_u_ * grid.u_max() / range_m : 1),
         pixels_per_u_(kPixels / std::max(grid.u_max(), grid.v_max())),
         height_px_(grid.v_max() * pixels_per_u_) {}

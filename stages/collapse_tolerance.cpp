@@ -56,11 +56,8 @@ bool CollapseTolerance::holds(const std::array<const TinVertex*, 3>& triangle) {
 
 // The error of a decoded tile (tile_error.h) is taken at the vertex where one stands at a post.
 bool CollapseTolerance::agrees_with_its_post(const TinVertex& vertex) const {
-  const auto column = std::lower_bound(grid_.u.begin(), grid_.u.end(), vertex.u);
-  const auto row = std::lower_bound(grid_.v.begin(), grid_.v.end(), vertex.v);
-  if (*column != vertex.u || *row != vertex.v) return true;
-  const std::int32_t post = grid_.index(static_cast<std::int32_t>(column - grid_.u.begin()),
-                                        static_cast<std::int32_t>(row - grid_.v.begin()));
+  const std::int32_t post = post_at(grid_, vertex.u, vertex.v);
+  if (post == kNoPost) return true;
   return std::abs(vertex.height_m - errors_.base_m() -
                   static_cast<double>(errors_.height_m(post))) <=
          static_cast<double>(errors_.threshold_m());

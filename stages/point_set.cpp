@@ -195,12 +195,9 @@ TinVertex PointSetSimplification::vertex_near(const SurfacePoint& point,
                    .post = kNoPost,
                    .height_m = snapped_height(std::clamp(point.height_m, lowest_m_, highest_m_),
                                               options_.height_step_m)};
-  const auto column = std::lower_bound(grid_.u.begin(), grid_.u.end(), vertex.u);
-  const auto row = std::lower_bound(grid_.v.begin(), grid_.v.end(), vertex.v);
-  if (*column != vertex.u || *row != vertex.v) return vertex;
-  const TinVertex at_post =
-      vertex_at(grid_.index(static_cast<std::int32_t>(column - grid_.u.begin()),
-                            static_cast<std::int32_t>(row - grid_.v.begin())));
+  const std::int32_t post = post_at(grid_, vertex.u, vertex.v);
+  if (post == kNoPost) return vertex;
+  const TinVertex at_post = vertex_at(post);
   return at_post.height_m == vertex.height_m ? at_post : vertex;
 }
 

@@ -23,22 +23,13 @@ struct Surface {
   std::span<const std::uint32_t> indices;
 };
 
-std::int32_t post_at(const PostGrid& grid, const IntPoint& place) {
-  const auto column = std::lower_bound(grid.u.begin(), grid.u.end(), place.x);
-  const auto row = std::lower_bound(grid.v.begin(), grid.v.end(), place.y);
-  if (column == grid.u.end() || *column != place.x) return kNoPost;
-  if (row == grid.v.end() || *row != place.y) return kNoPost;
-  return grid.index(static_cast<std::int32_t>(column - grid.u.begin()),
-                    static_cast<std::int32_t>(row - grid.v.begin()));
-}
-
 Surface surface_of(const PostGrid& grid, const QuantizedMesh& mesh) {
   Surface surface;
   surface.indices = mesh.indices;
   for (std::size_t k = 0; k < mesh.vertex_count(); ++k) {
     surface.places.push_back({mesh.u[k], mesh.v[k]});
     surface.heights_m.push_back(decoded_height_m(mesh, k));
-    surface.posts.push_back(post_at(grid, surface.places.back()));
+    surface.posts.push_back(post_at(grid, surface.places.back().x, surface.places.back().y));
   }
   return surface;
 }

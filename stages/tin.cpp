@@ -1,5 +1,7 @@
 #include "stages/tin.h"
 
+#include <algorithm>
+
 #include "stages/height_step.h"
 
 namespace qmpipe {
@@ -10,6 +12,15 @@ TinVertex vertex_at_post(const PostGrid& grid, std::int32_t post, float height_m
           .v = grid.v[static_cast<std::size_t>(grid.row(post))],
           .post = post,
           .height_m = snapped_height(static_cast<double>(height_m), height_step_m)};
+}
+
+std::int32_t post_at(const PostGrid& grid, std::int32_t u, std::int32_t v) {
+  const auto column = std::lower_bound(grid.u.begin(), grid.u.end(), u);
+  const auto row = std::lower_bound(grid.v.begin(), grid.v.end(), v);
+  if (column == grid.u.end() || *column != u) return kNoPost;
+  if (row == grid.v.end() || *row != v) return kNoPost;
+  return grid.index(static_cast<std::int32_t>(column - grid.u.begin()),
+                    static_cast<std::int32_t>(row - grid.v.begin()));
 }
 
 BorderMask border_of(const Tin& tin, Side side) {

@@ -40,6 +40,9 @@ using FixedBorders = std::array<std::optional<BorderMask>, 4>;
 TinVertex vertex_at_post(const PostGrid& grid, std::int32_t post, float height_m,
                          double height_step_m);
 
+// The post whose rounded place this is, or kNoPost.
+std::int32_t post_at(const PostGrid& grid, std::int32_t u, std::int32_t v);
+
 // The vertices on one side of a tile. REQUIRES: the TIN of a tile.
 BorderMask border_of(const Tin& tin, Side side);
 
