@@ -99,11 +99,10 @@ class FolderSink final : public TileSink {
     return ::stat((folder_ / tile_file_name(key)).c_str(), &status) == 0 && S_ISREG(status.st_mode);
   }
 
-  void close(const LayerJson& layer) override {
+  void close(const std::string& layer_json) override {
     QMPIPE_CHECK(!is_closed_);
     sync();
-    const std::string text = write_layer_json(layer);
-    const std::vector<std::uint8_t> bytes(text.begin(), text.end());
+    const std::vector<std::uint8_t> bytes(layer_json.begin(), layer_json.end());
     // Whoever sees that the set is whole may remove what it could be resumed from.
     write_file_durably(folder_ / "layer.json", bytes);
     is_closed_ = true;

@@ -13,8 +13,6 @@
 
 namespace qmpipe {
 
-enum class Overwrite { kNo, kYes };
-
 // Creates the folder (and its parents). Throws IoError when it cannot be written to, or when it
 // holds anything and `overwrite` is kNo; with kYes an earlier tile set in it is removed first:
 // layer.json, report.json, the tiles in numbered zoom folders, files left by an interrupted write,

@@ -11,6 +11,7 @@
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/folder_sink.h"
+#include "formats/layer_json.h"
 #include "pipeline/build_plan.h"
 #include "pipeline/fingerprint.h"
 #include "pipeline/memory_share.h"
@@ -224,7 +225,7 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
   const std::string text = write_report(result.report);
   write_file_atomically(options.output.path / "report.json",
                         {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
-  sink->close(layer_for(options, survey, plan, result.report));
+  sink->close(write_layer_json(layer_for(options, survey, plan, result.report)));
   return result;
 }
 

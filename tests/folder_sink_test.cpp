@@ -1,4 +1,5 @@
 #include "formats/folder_sink.h"
+#include "formats/layer_json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -38,7 +39,7 @@ TEST(FolderSink, TilesAndLayerStandWhereServersLookForThem) {
   EXPECT_FALSE(folder.has("deep/out/layer.json"));
   LayerJson layer;
   layer.name = "trial";
-  sink->close(layer);
+  sink->close(write_layer_json(layer));
   EXPECT_EQ(folder.get("deep/out/0/1/0.terrain"), "\x01\x02\x03");
   EXPECT_EQ(folder.get("deep/out/12/4000/78.terrain"), "\x09");
   EXPECT_TRUE(folder.has("deep/out/12/4000/77.terrain"));
@@ -68,7 +69,7 @@ TEST(FolderSink, AResumedSetKeepsWhatItHasAndTakesTilesAgain) {
   EXPECT_TRUE(sink->has(first));
   EXPECT_FALSE(sink->has({.zoom = 1, .x = 1, .y = 1}));
   sink->write(second, Bytes{3});
-  sink->close({});
+  sink->close(write_layer_json(LayerJson()));
   EXPECT_EQ(folder.get("out/1/0/0.terrain"), "\x01");
   EXPECT_EQ(folder.get("out/1/0/1.terrain"), "\x03");
   EXPECT_FALSE(folder.has("out/1/0/1.terrain.qmpipe-tmp"));
@@ -85,7 +86,7 @@ TEST(FolderSink, AFolderThatIsTakenAwayIsNoticed) {
   EXPECT_THAT(io_error_of([&] { sink->write({.zoom = 1, .x = 1, .y = 0}, Bytes{1}); }),
               HasSubstr("removed or replaced"));
   EXPECT_THAT(io_error_of([&] { sink->sync(); }), HasSubstr("removed or replaced"));
-  EXPECT_THAT(io_error_of([&] { sink->close({}); }), HasSubstr("removed or replaced"));
+  EXPECT_THAT(io_error_of([&] { sink->close(write_layer_json(LayerJson())); }), HasSubstr("removed or replaced"));
   EXPECT_TRUE(std::filesystem::is_empty(out));
 }
 
@@ -109,7 +110,7 @@ TEST(FolderSink, OverwriteRemovesATileSetAndNothingElse) {
   EXPECT_FALSE(folder.has("0/0"));
   EXPECT_TRUE(elsewhere.has("1/1.terrain"));
   sink->write({.zoom = 0, .x = 0, .y = 0}, Bytes{1});
-  sink->close({});
+  sink->close(write_layer_json(LayerJson()));
 }
 
 TEST(FolderSink, APathUnderAFileIsRefusedWithARemedy) {

@@ -7,6 +7,7 @@
 #include "formats/errors.h"
 #include "formats/folder_sink.h"
 #include "formats/gzip.h"
+#include "formats/layer_json.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {
@@ -27,7 +28,7 @@ TEST(TileSet, WhatTheSinkWroteIsFoundSortedAndReadBack) {
   for (const TileKey& key : keys) {
     sink->write(key, Bytes(static_cast<std::size_t>(key.x), 'q'));
   }
-  sink->close({});
+  sink->close(write_layer_json(LayerJson()));
   const auto tiles = open_tile_set(folder.path());
   std::vector<TileKey> sorted = keys;
   std::sort(sorted.begin(), sorted.end());

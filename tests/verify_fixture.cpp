@@ -9,6 +9,7 @@
 
 #include "formats/file_bytes.h"
 #include "formats/folder_sink.h"
+#include "formats/layer_json.h"
 #include "formats/gzip.h"
 #include "formats/tile_path.h"
 #include "stages/greedy.h"
@@ -131,7 +132,7 @@ SetFixture::SetFixture(const SetPlan& plan) {
   for (std::int32_t zoom = 0; zoom <= layer.max_zoom; ++zoom) {
     layer.available.push_back(merge_ranges(by_zoom[zoom]));
   }
-  sink->close(layer);
+  sink->close(write_layer_json(layer));
 }
 
 std::filesystem::path SetFixture::file_of(const TileKey& key) const {

@@ -8,9 +8,10 @@ set -euo pipefail
 build_packages=(
   g++ cmake ninja-build ccache git ca-certificates pkg-config
   libtbb-dev libgdal-dev libproj-dev libhdf5-dev libzstd-dev libdeflate-dev libmeshoptimizer-dev libcgal-dev
+  libsqlite3-dev libcpp-httplib-dev
   libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   libgtest-dev libgmock-dev libbenchmark-dev
-  gdal-bin python3
+  gdal-bin python3 sqlite3
 )
 dev_packages=(clang-14 clang-format-14 clang-tidy-14 libclang-rt-14-dev valgrind linux-perf)
 

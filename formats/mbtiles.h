@@ -1,0 +1,39 @@
+// A tile set as one SQLite file: MBTiles 1.3 (https://github.com/mapbox/mbtiles-spec).
+//
+// Rows count from the south (TMS), as our y does. Equal tiles are stored once: `map` points to
+// `images`, and the view `tiles` joins them as the specification has it. metadata holds name,
+// format (application/vnd.quantized-mesh), bounds, center, minzoom, maxzoom, attribution,
+// description, version, type (baselayer), scheme (tms), the tiling's crs (EPSG:4326 or EPSG:3857)
+// and layer.json, whole, under that name.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "formats/tile_set.h"
+#include "formats/tile_sink.h"
+
+namespace qmpipe {
+
+// Tiles go to PATH.qmpipe-tmp, which takes the file's name in close(): a file that has its name is
+// whole. Throws IoError when it cannot be written, or when `path` exists and `overwrite` is kNo;
+// with kYes the older file stays until close().
+//
+// Guarantees: what sync() returned from outlives a kill and a power cut. The same tiles in the same
+// order make the same bytes, however often the run was interrupted and wherever sync() was called
+// (for one version of SQLite). A tile that is there with the same bytes is not written again.
+std::unique_ptr<TileSink> open_mbtiles_sink(const std::filesystem::path& path, Overwrite overwrite);
+
+// Goes on with PATH.qmpipe-tmp, or starts it when it is gone; an older file at `path` stays until
+// close(). Throws IoError when it is not ours or damaged.
+std::unique_ptr<TileSink> resume_mbtiles_sink(const std::filesystem::path& path);
+
+// How a file numbers its rows; ours and the specification's is kTms.
+enum class RowOrder { kTms, kXyz };
+
+// Reads any program's MBTiles; layer_text() is the metadata's `layer.json` (or `layer_json`).
+// Throws IoError when it is no MBTiles file. A damaged file never crashes the program.
+std::unique_ptr<TileSet> open_mbtiles_set(const std::filesystem::path& path,
+                                          RowOrder rows = RowOrder::kTms);
+
+}  // namespace qmpipe
