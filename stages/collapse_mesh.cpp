@@ -20,8 +20,11 @@ CollapseMesh::CollapseMesh(std::span<const std::uint32_t> indices, std::size_t v
   }
   triangle_count_ = half_edge_count() / 3;
   QMPIPE_CHECK(std::find(out_.begin(), out_.end(), kNone) == out_.end());
-  // Euler's formula.
-  QMPIPE_CHECK(static_cast<std::int64_t>(vertex_count) - edge_count_ + triangle_count_ == 1);
+  std::int64_t in_fans = 0;
+  for (Index v = 0; v < this->vertex_count(); ++v) {
+    each_leaving(v, [&in_fans](Index /*e*/) { ++in_fans; });
+  }
+  QMPIPE_CHECK(in_fans == half_edge_count());
 }
 
 void CollapseMesh::find_twins() {

@@ -1,4 +1,4 @@
-// The connectivity of a triangulated disk whose edges are collapsed one by one: half-edges in
+// The connectivity of a triangulated surface whose edges are collapsed one by one: half-edges in
 // arrays, no geometry. Edge collapse and QEM share it.
 //
 // Notation: triangle t has half-edges 3t, 3t+1, 3t+2; half-edge e runs from origin(e) to target(e),
@@ -6,8 +6,9 @@
 // goes by the lower of its half-edges. Numbers of triangles and vertices never change; those that a
 // collapse removes are dead.
 //
-// Guarantees: what was a disk stays one while every collapse may_collapse(). The result depends on
-// the triangles given and the collapses alone.
+// Guarantees: what was a disk stays one while every collapse may_collapse(), and so does any surface
+// without a vertex at which two parts touch. The result depends on the triangles given and the
+// collapses alone.
 #pragma once
 
 #include <cstdint>
@@ -21,8 +22,8 @@ class CollapseMesh {
   using Index = std::int32_t;
   static constexpr Index kNone = -1;
 
-  // REQUIRES: a triangulated disk, three vertices for each triangle, counter-clockwise, each of the
-  // vertices in use.
+  // REQUIRES: a triangulated disk, or several, with or without holes: three vertices for each
+  // triangle, counter-clockwise; each of the vertices in use, and its triangles in one fan.
   CollapseMesh(std::span<const std::uint32_t> indices, std::size_t vertex_count);
 
   static Index next(Index e) { return e % 3 == 2 ? e - 2 : e + 1; }
@@ -75,7 +76,7 @@ class CollapseMesh {
     });
   }
 
-  // Whether a disk stays when the edge becomes a vertex: its ends have no neighbours in common but
+  // Whether the surface stays what it is when the edge becomes a vertex: its ends have no neighbours in common but
   // those across its triangles, and when both lie on the hull, so does it.
   bool may_collapse(Index e) const;
   // Merges the ends of e into one, which takes the number `kept`; the other vertex and the edge's

@@ -29,6 +29,7 @@ class CollapseQueue {
   }
 
   bool empty() const { return heap_.empty(); }
+  std::size_t size() const { return heap_.size(); }
   bool contains(Index edge) const { return place_[at(edge)] != kOutside; }
   // REQUIRES: !empty().
   const Entry& top() const { return heap_.front(); }
