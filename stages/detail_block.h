@@ -1,52 +1,17 @@
-// One block of a detail-increment model: the coarsest mesh and what makes it finer, step by step, and
-// the walk through all of its levels (Ai et al. 2019, sections 2.2 and 2.3.1).
-//
-// Level 0 is the coarsest; each level has one vertex and two triangles more than the one before it.
-// Points and triangles are numbered in that order: the coarsest mesh's first, then the split's own, so
-// that level l has the first coarse_points + l points and the first coarse_triangles + 2 l triangles,
-// and an increment need not name what it adds.
-//
-// A split is the inverse of a collapse. It names the first half-edge of a fan: the vertex v it leaves
-// is split, and the new vertex u takes over `fan` triangles around v, counter-clockwise from that one,
-// the last one ending at the edge from l to v. Two triangles are added: (v, r, u) and (v, u, l), where
-// r is the end of the half-edge. Half-edge 3 t + k leaves the k-th vertex of triangle t.
+// The walk through all levels of one block of a detail-increment model (Ai et al. 2019, sections 2.2 and
+// 2.3.1), and how a block is made.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
+#include "formats/detail_data.h"
 #include "formats/result.h"
-#include "stages/detail_point.h"
 #include "stages/detail_simplify.h"
 
 namespace qmpipe {
-
-struct DetailSplit {
-  std::uint32_t half_edge = 0;
-  std::uint32_t fan = 0;
-  friend bool operator==(const DetailSplit&, const DetailSplit&) = default;
-};
-
-struct DetailBlock {
-  std::vector<DetailPoint> points;
-  std::vector<std::uint32_t> coarse_triangles;  // three points each, counter-clockwise
-  std::vector<DetailSplit> splits;
-  // Of each level, levels() + 1 values, metres: the smallest visible object, the root of the mean
-  // least quadric error, made to fall (not rise) from level to level.
-  std::vector<float> svo_m;
-
-  std::size_t levels() const { return splits.size(); }
-  std::size_t coarse_points() const { return points.size() - splits.size(); }
-  std::size_t points_at(std::size_t level) const { return coarse_points() + level; }
-  std::size_t triangles_at(std::size_t level) const {
-    return coarse_triangles.size() / 3 + 2 * level;
-  }
-  friend bool operator==(const DetailBlock&, const DetailBlock&) = default;
-};
 
 // A block from a mesh and the record of its simplification; which point became which: `order[k]` is
 // the number in `points` of the block's point k. REQUIRES: what simplify_by_quadrics() was given.

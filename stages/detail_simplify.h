@@ -15,8 +15,8 @@
 #include <span>
 #include <vector>
 
+#include "formats/detail_data.h"
 #include "stages/collapse_mesh.h"
-#include "stages/detail_point.h"
 
 namespace qmpipe {
 

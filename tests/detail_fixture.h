@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "stages/detail_point.h"
+#include "formats/detail_data.h"
 
 namespace qmpipe::testing {
 
