@@ -9,6 +9,7 @@
 #include <array>
 
 #include "scheduler/check.h"
+#include "stages/morton.h"
 
 namespace qmpipe {
 namespace {
@@ -64,21 +65,13 @@ using Structure = CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>;
 using Cdt = CGAL::Constrained_Delaunay_triangulation_2<ExactKernel, Structure,
                                                        CGAL::No_constraint_intersection_tag>;
 
-std::uint64_t spread_bits(std::uint64_t x) {
-  x = (x | x << 16U) & 0x0000FFFF0000FFFFULL;
-  x = (x | x << 8U) & 0x00FF00FF00FF00FFULL;
-  x = (x | x << 4U) & 0x0F0F0F0F0F0F0F0FULL;
-  x = (x | x << 2U) & 0x3333333333333333ULL;
-  return (x | x << 1U) & 0x5555555555555555ULL;
-}
-
 // Along a space-filling curve, so that each point is near the one before it.
 std::vector<std::uint32_t> insertion_order(std::span<const IntPoint> points) {
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
   keys.reserve(points.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
-    keys.emplace_back(spread_bits(static_cast<std::uint64_t>(points[k].x)) |
-                          spread_bits(static_cast<std::uint64_t>(points[k].y)) << 1U,
+    keys.emplace_back(morton_code(static_cast<std::uint32_t>(points[k].x),
+                                  static_cast<std::uint32_t>(points[k].y)),
                       static_cast<std::uint32_t>(k));
   }
   std::sort(keys.begin(), keys.end());
