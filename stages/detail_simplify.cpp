@@ -71,13 +71,15 @@ class Simplifier {
     }
   }
 
-  DetailRecord run(std::int64_t target_triangles) {
+  DetailRecord run(std::int64_t target_triangles, const std::function<void(std::int64_t)>& tick) {
+    constexpr std::size_t kCollapsesATick = 4096;
     DetailRecord record;
     while (mesh_.triangle_count() > target_triangles && !queue_.empty()) {
       const Index u = queue_.top().edge;
       const Index e = half_edge_to(u, vertices_[at(u)].target);
       if (is_sound(e)) {
         collapse(e, record);
+        if (tick && record.collapses.size() % kCollapsesATick == 0) tick(kCollapsesATick);
       } else {
         find_sound_target(u);
       }
@@ -242,12 +244,13 @@ class Simplifier {
 
 DetailRecord simplify_by_quadrics(std::span<const DetailPoint> points,
                                   std::span<const std::uint32_t> triangles,
-                                  const DetailFrame& frame, std::int64_t target_triangles) {
+                                  const DetailFrame& frame, std::int64_t target_triangles,
+                                  const std::function<void(std::int64_t)>& tick) {
   for (const DetailPoint& point : points) {
     QMPIPE_CHECK(0 <= point.x && point.x <= kDetailGridMax);
     QMPIPE_CHECK(0 <= point.y && point.y <= kDetailGridMax);
   }
-  return Simplifier(points, triangles, frame).run(target_triangles);
+  return Simplifier(points, triangles, frame).run(target_triangles, tick);
 }
 
 }  // namespace qmpipe

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -41,10 +42,12 @@ struct DetailRecord {
   double mean_least_error_m2 = 0;
 };
 
-// Until `target_triangles` are left or no vertex may go. REQUIRES: triangles as CollapseMesh takes
+// Until `target_triangles` are left or no vertex may go. `tick` is told every few thousand collapses how
+// many there were since it was last called; what it throws ends the work. REQUIRES: triangles as CollapseMesh takes
 // them, counter-clockwise in the plane; points within the grid.
 DetailRecord simplify_by_quadrics(std::span<const DetailPoint> points,
                                   std::span<const std::uint32_t> triangles,
-                                  const DetailFrame& frame, std::int64_t target_triangles);
+                                  const DetailFrame& frame, std::int64_t target_triangles,
+                                  const std::function<void(std::int64_t)>& tick = {});
 
 }  // namespace qmpipe

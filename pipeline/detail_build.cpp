@@ -1,0 +1,170 @@
+#include "pipeline/detail_build.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "formats/errors.h"
+#include "formats/raster_source.h"
+#include "pipeline/dem.h"
+#include "stages/detail_block.h"
+#include "stages/detail_simplify.h"
+
+namespace qmpipe {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void require_sound(const DetailBuildOptions& options) {
+  if (!(options.keep_share > 0 && options.keep_share <= 1)) {
+    throw UsageError(fmt::format("--keep {:g}%: give more than 0 and at most 100 per cent",
+                                 100 * options.keep_share));
+  }
+  constexpr std::int32_t kMostBlocks = 65536;
+  if (options.blocks < 1 || options.blocks > kMostBlocks) {
+    throw UsageError(fmt::format("--blocks {}: give 1 to {}", options.blocks, kMostBlocks));
+  }
+  if (options.interval < 1) throw UsageError("--interval 0: give at least 1");
+  if (!(options.height_step_m >= 0) || !std::isfinite(options.height_step_m)) {
+    throw UsageError(fmt::format("--height-step {:g}: give metres above 0", options.height_step_m));
+  }
+}
+
+bool are_whole_metres(const Dem& dem) {
+  for (std::size_t k = 0; k < dem.heights_m.size(); ++k) {
+    if (dem.valid[k] != 0 && dem.heights_m[k] != std::round(dem.heights_m[k])) return false;
+  }
+  return true;
+}
+
+// x and y of the south-western post: those of the CRS in metres, and of degrees none.
+std::array<double, 2> origin_of(const Dem& dem) {
+  if (dem.info.is_geographic) return {0, 0};
+  const PixelPoint pixel = dem.pixel_of(0, 0);
+  const PixelPlane& plane = dem.info.plane;
+  return {(plane.x0 + plane.x_per_column * pixel.column) * plane.unit,
+          (plane.y0 + plane.y_per_row * pixel.row) * plane.unit};
+}
+
+DetailFrame frame_of(const Dem& dem, double height_step_m) {
+  const PostSpacing spacing = post_spacing(dem.info);
+  const auto [x_m, y_m] = origin_of(dem);
+  const double step_m = height_step_m > 0 ? height_step_m : are_whole_metres(dem) ? 1.0 : 0.01;
+  return {.offset = {x_m, y_m, 0}, .step_m = {spacing.x_m, spacing.y_m, step_m}};
+}
+
+std::vector<std::int32_t> rounded_heights(const Dem& dem, double step_m) {
+  std::vector<std::int32_t> z(dem.heights_m.size());
+  for (std::size_t k = 0; k < z.size(); ++k) {
+    const double steps = std::round(dem.heights_m[k] / step_m);
+    if (std::abs(steps) > kDetailGridMax) {
+      throw UsageError(fmt::format("--height-step {:g}: a height of {:g} m has too many steps",
+                                   step_m, dem.heights_m[k]));
+    }
+    z[k] = static_cast<std::int32_t>(steps);
+  }
+  return z;
+}
+
+std::size_t triangle_count(const DetailBase& base) {
+  std::size_t count = base.seams.size();
+  for (const BaseBlock& block : base.blocks) count += block.triangles.size() / 3;
+  return count;
+}
+
+}  // namespace
+
+DetailModel simplify_base(DetailBase base, const DetailFrame& frame,
+                          const DetailBuildOptions& options, Progress& progress,
+                          DetailBuildReport& report) {
+  const auto target = [&](const BaseBlock& block) {
+    const auto triangles = static_cast<double>(block.triangles.size() / 3);
+    return static_cast<std::int64_t>(std::ceil(options.keep_share * triangles));
+  };
+  std::int64_t to_do = 0;
+  for (const BaseBlock& block : base.blocks) {
+    to_do += (static_cast<std::int64_t>(block.triangles.size() / 3) - target(block)) / 2;
+  }
+  report.finest_triangles = static_cast<std::int64_t>(triangle_count(base));
+  report.seam_triangles = static_cast<std::int64_t>(base.seams.size());
+  std::vector<OrderedBlock> made(base.blocks.size());
+  progress.begin("simplify", "collapses", to_do);
+  tbb::task_arena arena(options.threads);
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, base.blocks.size(), [&](std::size_t b) {
+      BaseBlock block = std::exchange(base.blocks[b], {});
+      DetailRecord record;
+      if (block.mesh_points > 0) {
+        record =
+            simplify_by_quadrics(std::span(block.points).first(block.mesh_points), block.triangles,
+                                 frame, target(block), [&](std::int64_t collapses) {
+                                   progress.advance(collapses);
+                                   progress.check_stop();
+                                 });
+      }
+      made[b] = make_detail_block(block.points, block.triangles, record);
+    });
+  });
+  progress.end();
+  DetailModel model;
+  model.frame = frame;
+  model.interval = options.interval;
+  std::vector<std::vector<std::uint32_t>> place(made.size());
+  for (std::size_t b = 0; b < made.size(); ++b) {
+    place[b].resize(made[b].order.size());
+    for (std::size_t k = 0; k < made[b].order.size(); ++k) {
+      place[b][made[b].order[k]] = static_cast<std::uint32_t>(k);
+    }
+    report.collapses += static_cast<std::int64_t>(made[b].block.levels());
+    report.points += static_cast<std::int64_t>(made[b].block.points.size());
+    model.blocks.push_back(std::move(made[b].block));
+  }
+  model.seams = std::move(base.seams);
+  for (DetailSeam& seam : model.seams) {
+    for (DetailCorner& corner : seam) corner.point = place[corner.block][corner.point];
+  }
+  report.coarsest_triangles = report.finest_triangles - 2 * report.collapses;
+  return model;
+}
+
+DetailBuilt build_detail(const DetailBuildOptions& options, Progress& progress) {
+  require_sound(options);
+  DetailBuilt built;
+  Clock::time_point start = Clock::now();
+  const std::unique_ptr<RasterSource> source = RasterSource::open(
+      options.input, {.crs_override = options.source_crs, .placing = Placing::kPlane});
+  const Dem dem = read_dem(*source);
+  const DetailFrame frame = frame_of(dem, options.height_step_m);
+  const std::vector<std::int32_t> z = rounded_heights(dem, frame.step_m[2]);
+  built.report.read_s = seconds_since(start);
+
+  start = Clock::now();
+  DetailBase base = grid_base(
+      {.columns = dem.grid.width_posts, .rows = dem.grid.height_posts, .z = z, .valid = dem.valid},
+      block_grid_of(options.blocks));
+  if (triangle_count(base) == 0) {
+    throw IoError("cannot make a model of", options.input, "no three valid pixels lie side by side",
+                  "check it with gdalinfo -stats");
+  }
+  built.report.triangulate_s = seconds_since(start);
+
+  start = Clock::now();
+  built.model = simplify_base(std::move(base), frame, options, progress, built.report);
+  built.model.crs_wkt = dem.info.crs_name;
+  built.report.left_out = static_cast<std::int64_t>(dem.post_count()) - built.report.points;
+  built.report.simplify_s = seconds_since(start);
+  return built;
+}
+
+}  // namespace qmpipe

@@ -1,0 +1,57 @@
+// `qmpipe detail build`: points or a DEM to a detail-increment model (Ai et al. 2019).
+//
+// Guarantees: the same input and options give the same model, bit for bit, on any number of threads.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "formats/detail_data.h"
+#include "pipeline/progress.h"
+#include "stages/detail_base.h"
+
+namespace qmpipe {
+
+struct DetailBuildOptions {
+  std::string input;
+  // As in OpenOptions. DEFAULT: empty, the file's own.
+  std::string source_crs = {};
+  // Part of the triangles that the coarsest level keeps. DEFAULT: 0.2, as in the paper.
+  double keep_share = 0.2;
+  // DEFAULT: 4, as in the paper.
+  std::int32_t blocks = 4;
+  // Levels between two stored thresholds, and in a step of a viewer. DEFAULT: 100.
+  std::uint32_t interval = 100;
+  // Heights of a DEM are rounded to multiples of it. DEFAULT: 0, that is 1 m where all are whole metres,
+  // else 1 cm.
+  double height_step_m = 0;
+  std::int32_t threads = 1;
+};
+
+struct DetailBuildReport {
+  std::int64_t points = 0;
+  std::int64_t left_out = 0;  // voids and points without a triangle
+  std::int64_t finest_triangles = 0;
+  std::int64_t coarsest_triangles = 0;
+  std::int64_t seam_triangles = 0;
+  std::int64_t collapses = 0;
+  double read_s = 0;
+  double triangulate_s = 0;
+  double simplify_s = 0;
+};
+
+struct DetailBuilt {
+  DetailModel model;
+  DetailBuildReport report;
+};
+
+// Throws UsageError for options that make no sense, IoError when the input cannot be read or has no
+// triangle.
+DetailBuilt build_detail(const DetailBuildOptions& options, Progress& progress);
+
+// Simplifies each block of a base, in parallel. `report` gets the counts of triangles and collapses.
+DetailModel simplify_base(DetailBase base, const DetailFrame& frame,
+                          const DetailBuildOptions& options, Progress& progress,
+                          DetailBuildReport& report);
+
+}  // namespace qmpipe
