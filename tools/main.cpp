@@ -11,6 +11,7 @@
 #include "pipeline/version.h"
 #include "tools/command_build.h"
 #include "tools/command_compare.h"
+#include "tools/command_detail.h"
 #include "tools/command_info.h"
 #include "tools/command_synth.h"
 #include "tools/command_tin.h"
@@ -41,6 +42,7 @@ int run(int argc, char** argv) {
   qmpipe::register_verify(app, action);
   qmpipe::register_compare(app, action);
   qmpipe::register_info(app, action);
+  qmpipe::register_detail(app, action);
   qmpipe::register_tin(app, action);
   qmpipe::register_synth(app, action);
   try {

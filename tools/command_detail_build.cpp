@@ -1,0 +1,169 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "formats/detail_file.h"
+#include "formats/errors.h"
+#include "pipeline/detail_build.h"
+#include "pipeline/process_memory.h"
+#include "tools/detail_commands.h"
+#include "tools/interrupt.h"
+
+namespace qmpipe {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFooter =
+    "The terrain is cut into blocks by the middles of x and y, each is triangulated and then\n"
+    "simplified by quadric errors down to --keep of its triangles, and every step is kept. The\n"
+    "model is the same on any number of threads. An existing FILE is replaced.\n"
+    "\n"
+    "Examples:\n"
+    "  qmpipe detail build dem.tif -o terrain.h5\n"
+    "  qmpipe detail build dem.tif -o terrain.h5 --blocks 64 --keep 5% --interval 1000\n"
+    "Exit codes: 0 written, 1 failed, 2 wrong usage, 130 interrupted.";
+
+struct BuildArguments {
+  DetailBuildOptions options;
+  std::string output;
+  std::string keep = "20%";
+  bool json = false;
+};
+
+double parse_keep(const std::string& text) {
+  const bool is_percent = text.ends_with('%');
+  try {
+    std::size_t used = 0;
+    const double value = std::stod(text, &used);
+    if (used == text.size() - (is_percent ? 1 : 0)) return is_percent ? value / 100 : value;
+  } catch (const std::logic_error&) {
+    // Not a number: said below.
+  }
+  throw UsageError(fmt::format("--keep {}: give a share, as 20% or 0.2", text));
+}
+
+void require_output(const BuildArguments& arguments) {
+  const fs::path folder = fs::absolute(arguments.output).parent_path();
+  std::error_code code;
+  if (fs::is_directory(folder, code)) return;
+  throw IoError("cannot write the model", arguments.output, "there is no folder " + folder.string(),
+                "make it, or choose another name");
+}
+
+void print_text(const BuildArguments& arguments, const DetailBuilt& built,
+                std::uintmax_t file_bytes) {
+  const DetailBuildReport& report = built.report;
+  const auto line = [](const char* name, const std::string& value) {
+    fmt::print("{:<12}{}\n", name, value);
+  };
+  line("model",
+       fmt::format("{}, {} bytes, {:.2f} a triangle of the finest mesh", arguments.output,
+                   file_bytes,
+                   static_cast<double>(file_bytes) /
+                       static_cast<double>(std::max<std::int64_t>(1, report.finest_triangles))));
+  line("points", fmt::format("{}, {} left out", report.points, report.left_out));
+  line("triangles",
+       fmt::format("{} at the finest level, {} at the coarsest, {} of them in seams",
+                   report.finest_triangles, report.coarsest_triangles, report.seam_triangles));
+  line("levels", fmt::format("{} in {} blocks", report.collapses, built.model.blocks.size()));
+  line("time", fmt::format("reading {:.2f} s, triangulating {:.2f} s, simplifying {:.2f} s",
+                           report.read_s, report.triangulate_s, report.simplify_s));
+  line("peak memory", fmt::format("{} bytes", peak_resident_bytes()));
+}
+
+void print_json(const BuildArguments& arguments, const DetailBuilt& built,
+                std::uintmax_t file_bytes) {
+  const DetailBuildReport& report = built.report;
+  const Json document = {{"model", arguments.output},
+                         {"file_bytes", file_bytes},
+                         {"points", report.points},
+                         {"left_out", report.left_out},
+                         {"finest_triangles", report.finest_triangles},
+                         {"coarsest_triangles", report.coarsest_triangles},
+                         {"seam_triangles", report.seam_triangles},
+                         {"levels", report.collapses},
+                         {"blocks", built.model.blocks.size()},
+                         {"seconds",
+                          {{"read", report.read_s},
+                           {"triangulate", report.triangulate_s},
+                           {"simplify", report.simplify_s}}},
+                         {"peak_memory_bytes", peak_resident_bytes()}};
+  fmt::print("{}\n", document.dump(2));
+}
+
+int run_build(BuildArguments arguments) {
+  arguments.options.keep_share = parse_keep(arguments.keep);
+  require_output(arguments);
+  ProgressStyle style =
+      ::isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent;
+  Progress progress(style, stop_flag_of_signals());
+  const DetailBuilt built = build_detail(arguments.options, progress);
+  write_detail_file(arguments.output, built.model);
+  const std::uintmax_t file_bytes = fs::file_size(arguments.output);
+  if (arguments.json) {
+    print_json(arguments, built, file_bytes);
+  } else {
+    print_text(arguments, built, file_bytes);
+  }
+  return 0;
+}
+
+}  // namespace
+
+void register_detail_build(CLI::App& detail, std::function<int()>& action) {
+  const auto arguments = std::make_shared<BuildArguments>();
+  DetailBuildOptions& options = arguments->options;
+  options.threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
+  CLI::App* command = detail.add_subcommand("build", "Turn a DEM into a detail-increment model");
+  command->footer(kFooter);
+  command
+      ->add_option(
+          "INPUT", options.input,
+          "Raster of any GDAL format, 2 x 2 to 32768 x 32768 pixels; each pixel is a point")
+      ->required();
+  command->add_option("-o,--output", arguments->output, "Model to write (HDF5)")
+      ->required()
+      ->type_name("FILE");
+  command
+      ->add_option("--keep", arguments->keep,
+                   "Share of each block's triangles that its coarsest level has")
+      ->capture_default_str()
+      ->type_name("SHARE");
+  command
+      ->add_option("--blocks", options.blocks,
+                   "Blocks, which have levels of their own: 4 are two by two")
+      ->capture_default_str()
+      ->type_name("N");
+  command
+      ->add_option("--interval", options.interval,
+                   "Levels between two thresholds that the file keeps, and in a viewer's step")
+      ->capture_default_str()
+      ->type_name("K");
+  command
+      ->add_option(
+          "--height-step", options.height_step_m,
+          "Heights are rounded to multiples of it, metres (default: 1 where all heights are "
+          "whole metres, else 0.01)")
+      ->type_name("M");
+  command
+      ->add_option("--source-crs", options.source_crs,
+                   "Take this CRS instead of the one that the input names (EPSG:n, WKT, PROJ)")
+      ->type_name("CRS");
+  command->add_option("--threads", options.threads, "Threads, each with a block of its own")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Report as JSON");
+  command->callback(
+      [arguments, &action] { action = [arguments] { return run_build(*arguments); }; });
+}
+
+}  // namespace qmpipe

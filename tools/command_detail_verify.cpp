@@ -1,0 +1,145 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "pipeline/detail_extract.h"
+#include "pipeline/detail_verify.h"
+#include "tools/detail_commands.h"
+#include "tools/interrupt.h"
+
+namespace qmpipe {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kExitFaults = 3;
+
+struct VerifyArguments {
+  std::string path;
+  std::int32_t threads = 1;
+  bool json = false;
+};
+
+int run_verify(const VerifyArguments& arguments) {
+  const DetailModel model = load_model(arguments.path);
+  Progress progress(
+      ::isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent,
+      stop_flag_of_signals());
+  const DetailVerifyReport report = verify_detail(model, arguments.threads, progress);
+  if (arguments.json) {
+    const Json document = {{"levels_walked", report.levels_walked},
+                           {"triangles_checked", report.triangles_checked},
+                           {"faults", report.faults}};
+    fmt::print("{}\n", document.dump(2));
+  } else {
+    fmt::print("{} levels walked up and down, {} triangles checked\n", report.levels_walked,
+               report.triangles_checked);
+    for (const std::string& fault : report.faults) fmt::print("fault: {}\n", fault);
+    if (report.faults.empty()) fmt::print("no faults\n");
+  }
+  return report.faults.empty() ? 0 : kExitFaults;
+}
+
+struct InfoArguments {
+  std::string path;
+  bool json = false;
+};
+
+Json block_json(const DetailBlock& block) {
+  return {{"points", block.points.size()},
+          {"levels", block.levels()},
+          {"coarsest_triangles", block.triangles_at(0)},
+          {"finest_triangles", block.triangles_at(block.levels())},
+          {"coarsest_svo_m", block.svo_m.front()},
+          {"finest_svo_m", block.svo_m.back()}};
+}
+
+void print_info(const InfoArguments& arguments, const DetailModel& model) {
+  std::error_code code;
+  fmt::print("{}: {} bytes, {} blocks, {} triangles in seams, interval {}\n", arguments.path,
+             std::filesystem::file_size(arguments.path, code), model.blocks.size(),
+             model.seams.size(), model.interval);
+  const DetailFrame& frame = model.frame;
+  fmt::print("steps {:g} x {:g} x {:g} m from {:.3f} {:.3f} {:.3f}\n", frame.step_m[0],
+             frame.step_m[1], frame.step_m[2], frame.offset[0], frame.offset[1], frame.offset[2]);
+  fmt::print("{:>6} {:>10} {:>10} {:>12} {:>12} {:>12} {:>12}\n", "block", "points", "levels",
+             "coarsest T", "finest T", "coarsest svo", "finest svo");
+  for (std::size_t b = 0; b < model.blocks.size(); ++b) {
+    const DetailBlock& block = model.blocks[b];
+    fmt::print("{:>6} {:>10} {:>10} {:>12} {:>12} {:>12.4g} {:>12.4g}\n", b, block.points.size(),
+               block.levels(), block.triangles_at(0), block.triangles_at(block.levels()),
+               block.svo_m.front(), block.svo_m.back());
+  }
+}
+
+int run_info(const InfoArguments& arguments) {
+  const DetailModel model = load_model(arguments.path);
+  if (!arguments.json) {
+    print_info(arguments, model);
+    return 0;
+  }
+  Json blocks = Json::array();
+  for (const DetailBlock& block : model.blocks) blocks.push_back(block_json(block));
+  const Json document = {{"interval", model.interval},
+                         {"crs", model.crs_wkt},
+                         {"offset", model.frame.offset},
+                         {"step_m", model.frame.step_m},
+                         {"seam_triangles", model.seams.size()},
+                         {"coarsest_triangles", triangles_of(model, levels_at(model, 0))},
+                         {"finest_triangles", triangles_of(model, levels_for_svo(model, 0))},
+                         {"blocks", std::move(blocks)}};
+  fmt::print("{}\n", document.dump(2, ' ', false, Json::error_handler_t::replace));
+  return 0;
+}
+
+}  // namespace
+
+void register_detail_verify(CLI::App& detail, std::function<int()>& action) {
+  const auto arguments = std::make_shared<VerifyArguments>();
+  arguments->threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
+  CLI::App* command =
+      detail.add_subcommand("verify", "Check a model by walking through its levels");
+  command->footer(
+      "Walks each block from its coarsest level to its finest and back: every triangle of every "
+      "level\n"
+      "is counter-clockwise, the way back leads to the same meshes, the rims of blocks are the "
+      "same\n"
+      "on all levels, thresholds never rise towards finer levels. At the coarsest and the finest "
+      "level\n"
+      "also: no edge with three triangles, no overlap, seams among them.\n"
+      "\n"
+      "Example:\n"
+      "  qmpipe detail verify terrain.h5\n"
+      "Exit codes: 0 no fault, 1 the file cannot be read, 2 wrong usage, 3 faults, 130 "
+      "interrupted.");
+  command->add_option("FILE", arguments->path, "The model")->required();
+  command->add_option("--threads", arguments->threads, "Threads, each with a block of its own")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Report as JSON");
+  command->callback(
+      [arguments, &action] { action = [arguments] { return run_verify(*arguments); }; });
+}
+
+void register_detail_info(CLI::App& detail, std::function<int()>& action) {
+  const auto arguments = std::make_shared<InfoArguments>();
+  CLI::App* command = detail.add_subcommand("info", "Show what a model holds");
+  command->footer(
+      "svo: the smallest visible object of a level, metres.\n"
+      "\n"
+      "Example:\n"
+      "  qmpipe detail info terrain.h5 --json");
+  command->add_option("FILE", arguments->path, "The model")->required();
+  command->add_flag("--json", arguments->json, "Write JSON");
+  command->callback(
+      [arguments, &action] { action = [arguments] { return run_info(*arguments); }; });
+}
+
+}  // namespace qmpipe

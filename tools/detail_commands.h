@@ -1,0 +1,23 @@
+// The subcommands of `qmpipe detail`, one file each.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "formats/detail_data.h"
+
+namespace CLI {
+class App;
+}
+
+namespace qmpipe {
+
+void register_detail_build(CLI::App& detail, std::function<int()>& action);
+void register_detail_extract(CLI::App& detail, std::function<int()>& action);
+void register_detail_info(CLI::App& detail, std::function<int()>& action);
+void register_detail_verify(CLI::App& detail, std::function<int()>& action);
+
+// The model in a file. Throws IoError when it cannot be read.
+DetailModel load_model(const std::string& path);
+
+}  // namespace qmpipe
