@@ -12,6 +12,7 @@
 #include "tools/command_build.h"
 #include "tools/command_compare.h"
 #include "tools/command_info.h"
+#include "tools/command_serve.h"
 #include "tools/command_synth.h"
 #include "tools/command_tin.h"
 #include "tools/command_verify.h"
@@ -39,6 +40,7 @@ int run(int argc, char** argv) {
   std::function<int()> action;
   qmpipe::register_build(app, action);
   qmpipe::register_verify(app, action);
+  qmpipe::register_serve(app, action);
   qmpipe::register_compare(app, action);
   qmpipe::register_info(app, action);
   qmpipe::register_tin(app, action);
