@@ -10,6 +10,7 @@
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/gzip.h"
+#include "formats/pmtiles.h"
 #include "formats/tile_path.h"
 
 namespace qmpipe {
@@ -139,6 +140,9 @@ class FolderTileSet final : public TileSet {
 std::unique_ptr<TileSet> open_tile_set(const fs::path& path) {
   std::error_code code;
   const bool is_layer_json = path.filename() == "layer.json" && fs::is_regular_file(path, code);
+  if (path.extension() == ".pmtiles" && fs::is_regular_file(path, code)) {
+    return open_pmtiles_set(path);
+  }
   fs::path folder = is_layer_json ? path.parent_path() : path;
   if (folder.empty()) folder = ".";
   if (!fs::exists(folder, code)) {
