@@ -11,8 +11,12 @@
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/gzip.h"
+<<<<<<< HEAD
 #include "formats/mbtiles.h"
 #include "formats/tile_output.h"
+=======
+#include "formats/pmtiles.h"
+>>>>>>> pmt
 #include "formats/tile_path.h"
 
 namespace qmpipe {
@@ -179,7 +183,17 @@ bool is_tile_set(const fs::path& path) {
 
 std::unique_ptr<TileSet> open_tile_set(const fs::path& path) {
   std::error_code code;
+<<<<<<< HEAD
   if (!fs::exists(path, code)) {
+=======
+  const bool is_layer_json = path.filename() == "layer.json" && fs::is_regular_file(path, code);
+  if (path.extension() == ".pmtiles" && fs::is_regular_file(path, code)) {
+    return open_pmtiles_set(path);
+  }
+  fs::path folder = is_layer_json ? path.parent_path() : path;
+  if (folder.empty()) folder = ".";
+  if (!fs::exists(folder, code)) {
+>>>>>>> pmt
     throw IoError("cannot open the tile set", path.string(),
                   code ? code.message() : "there is no such file or folder", "Check the path.");
   }
