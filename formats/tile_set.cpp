@@ -11,12 +11,9 @@
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/gzip.h"
-<<<<<<< HEAD
 #include "formats/mbtiles.h"
-#include "formats/tile_output.h"
-=======
 #include "formats/pmtiles.h"
->>>>>>> pmt
+#include "formats/tile_output.h"
 #include "formats/tile_path.h"
 
 namespace qmpipe {
@@ -158,9 +155,11 @@ TileForm form_of_file(const fs::path& path) {
 }
 
 std::unique_ptr<TileSet> open_file_set(const fs::path& path) {
-  if (form_of_file(path) == TileForm::kMbtiles) return open_mbtiles_set(path);
+  const TileForm form = form_of_file(path);
+  if (form == TileForm::kMbtiles) return open_mbtiles_set(path);
+  if (form == TileForm::kPmtiles) return open_pmtiles_set(path);
   throw IoError("cannot open the tile set", path.string(),
-                "it is neither a folder nor an .mbtiles file", kRemedy);
+                "it is neither a folder nor an .mbtiles or .pmtiles file", kRemedy);
 }
 
 std::unique_ptr<TileSet> open_folder_set(const fs::path& folder) {
@@ -183,17 +182,7 @@ bool is_tile_set(const fs::path& path) {
 
 std::unique_ptr<TileSet> open_tile_set(const fs::path& path) {
   std::error_code code;
-<<<<<<< HEAD
   if (!fs::exists(path, code)) {
-=======
-  const bool is_layer_json = path.filename() == "layer.json" && fs::is_regular_file(path, code);
-  if (path.extension() == ".pmtiles" && fs::is_regular_file(path, code)) {
-    return open_pmtiles_set(path);
-  }
-  fs::path folder = is_layer_json ? path.parent_path() : path;
-  if (folder.empty()) folder = ".";
-  if (!fs::exists(folder, code)) {
->>>>>>> pmt
     throw IoError("cannot open the tile set", path.string(),
                   code ? code.message() : "there is no such file or folder", "Check the path.");
   }
