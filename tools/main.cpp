@@ -1,5 +1,5 @@
 // The program's one entry: parses, runs the command, and turns every error into a message and an
-// exit code (0 done, 1 failed, 2 usage, 3 verify found faults, 130 interrupted).
+// exit code (0 done, 1 failed, 2 usage, 3 faults or differences found, 130 interrupted).
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>

@@ -210,7 +210,7 @@ test('the picture of the README', patience, async (t) => {
   qmpipe('build', dem, '-o', set, '--name', 'Maritime Alps', '--tolerance', '5000');
   await withServer(set, async (address) => {
     const { page, wrong } = await openPage(browser, { width: 1280, height: 640 });
-    await page.goto(`${address}?lon=7.4&lat=43.95&heading=-8&pitch=-24&range=62000&ramp=fixed&bare=1`);
+    await page.goto(`${address}?lon=7.42&lat=43.9&heading=-12&pitch=-34&range=50000&ramp=fixed&bare=1`);
     await waitForTiles(page);
     const png = await page.screenshot({ path: join(work, 'readme.png') });
     expectPicture(await lookAt(page, png));
