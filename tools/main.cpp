@@ -1,5 +1,5 @@
 // The program's one entry: parses, runs the command, and turns every error into a message and an
-// exit code (0 done, 1 failed, 2 usage, 3 verify found faults, 130 interrupted).
+// exit code (0 done, 1 failed, 2 usage, 3 verify or check found faults, 130 interrupted).
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>
@@ -10,6 +10,7 @@
 #include "pipeline/progress.h"
 #include "pipeline/version.h"
 #include "tools/command_build.h"
+#include "tools/command_check.h"
 #include "tools/command_compare.h"
 #include "tools/command_info.h"
 #include "tools/command_synth.h"
@@ -39,6 +40,7 @@ int run(int argc, char** argv) {
   std::function<int()> action;
   qmpipe::register_build(app, action);
   qmpipe::register_verify(app, action);
+  qmpipe::register_check(app, action);
   qmpipe::register_compare(app, action);
   qmpipe::register_info(app, action);
   qmpipe::register_tin(app, action);
