@@ -78,7 +78,7 @@ std::optional<std::vector<std::uint8_t>> plain_body(const HttpAnswer& answer, Ch
   }
   std::vector<std::uint8_t> body = answer.body;
   std::vector<std::string> encodings = encodings_of(answer);
-  const bool is_announced = !encodings.empty();
+  const std::size_t announced = encodings.size();
   for (; !encodings.empty(); encodings.pop_back()) {
     const std::string& encoding = encodings.back();
     if (encoding != "gzip" && encoding != "x-gzip") {
@@ -99,7 +99,12 @@ std::optional<std::vector<std::uint8_t>> plain_body(const HttpAnswer& answer, Ch
     }
     body = std::move(*plain);
   }
+  if (announced > 1) {
+    add(CheckKind::kGzipTwiceAnnounced,
+        fmt::format("the body is gzipped {} times, and the answer says so", announced));
+  }
   if (!looks_gzipped(body)) return body;
+  const bool is_announced = announced > 0;
   add(is_announced ? CheckKind::kGzipTwice : CheckKind::kGzipNotAnnounced,
       is_announced ? "what \"Content-Encoding: gzip\" unzips to is gzip again"
                    : "the body is gzip, but the answer has no \"Content-Encoding: gzip\"");

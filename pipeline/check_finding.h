@@ -25,8 +25,9 @@ enum class CheckKind : std::uint8_t {
   // How any answer is sent.
   kCutOff,
   kGzipNotAnnounced,
-  kGzipAnnounced,  // but the bytes are plain
-  kGzipTwice,
+  kGzipAnnounced,       // but the bytes are plain
+  kGzipTwice,           // announced once
+  kGzipTwiceAnnounced,  // so that browsers undo both
   kGzipDamaged,
   kForeignEncoding,
   // layer.json.

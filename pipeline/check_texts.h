@@ -46,6 +46,9 @@ inline constexpr std::array<CheckKindText, kCheckKinds> kCheckTexts = {{
      "the browser unzips once and the viewer meets gzip again: \"Invalid typed array length\"",
      "The files are gzipped already: switch the server's or proxy's own compression off for them, "
      "or do not gzip them a second time."},
+    {CheckKind::kGzipTwiceAnnounced, "gzip-twice-announced", CheckSeverity::kWarning,
+     "browsers unzip both times, other clients may unzip once and fail",
+     "The files are gzipped already: switch the server's own compression off for them."},
     {CheckKind::kGzipDamaged, "gzip-damaged", CheckSeverity::kFault,
      "the browser fails to unzip the answer (\"net::ERR_CONTENT_DECODING_FAILED\")",
      "Copy the file again, in binary mode; look at what a proxy does to it."},

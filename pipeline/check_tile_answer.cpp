@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 
 #include "scheduler/check.h"
@@ -82,13 +83,17 @@ Sphere sphere_of(const RectangleDeg& rectangle, double low_m, double high_m) {
   return bounding_sphere(points);
 }
 
-bool lies_in(const RectangleDeg& rectangle, const QuantizedMeshHeader& header) {
+// From the sphere around the tile's rectangle to the header's, centre to centre, in radii of the
+// former; infinity where there are no numbers.
+double distance_radii(const RectangleDeg& rectangle, const QuantizedMeshHeader& header) {
   const double low_m = header.min_height_m;
   const double high_m = header.max_height_m;
-  if (!std::isfinite(low_m) || !std::isfinite(high_m)) return false;
-  const Sphere expected = sphere_of(rectangle, low_m, high_m);
-  const double distance_m = length(minus(header.sphere_centre_ecef_m, expected.centre));
-  return distance_m <= expected.radius_m;  // false for NaN
+  double distance = std::numeric_limits<double>::infinity();
+  if (std::isfinite(low_m) && std::isfinite(high_m)) {
+    const Sphere expected = sphere_of(rectangle, low_m, high_m);
+    distance = length(minus(header.sphere_centre_ecef_m, expected.centre)) / expected.radius_m;
+  }
+  return std::isnan(distance) ? std::numeric_limits<double>::infinity() : distance;
 }
 
 }  // namespace
@@ -127,10 +132,11 @@ TileKey mirrored(const TilingScheme& scheme, const TileKey& key) {
 TilePlace place_of_tile(const TilingScheme& scheme, const TileKey& key,
                         const QuantizedMeshHeader& header) {
   QMPIPE_CHECK(scheme.contains(key));
-  if (lies_in(scheme.rectangle_deg(key), header)) return TilePlace::kHere;
-  const TileKey mirror = mirrored(scheme, key);
-  const bool is_mirrored = mirror != key && lies_in(scheme.rectangle_deg(mirror), header);
-  return is_mirrored ? TilePlace::kMirroredRow : TilePlace::kElsewhere;
+  const double here = distance_radii(scheme.rectangle_deg(key), header);
+  const double mirrored_row = distance_radii(scheme.rectangle_deg(mirrored(scheme, key)), header);
+  // The spheres of low zooms reach into their mirrors: the nearer one counts there.
+  if (mirrored_row <= 1 && mirrored_row < here / 2) return TilePlace::kMirroredRow;
+  return here <= 1 ? TilePlace::kHere : TilePlace::kElsewhere;
 }
 
 }  // namespace qmpipe

@@ -20,8 +20,10 @@ enum class TilePlace : std::uint8_t {
   kMirroredRow,  // where the tile of the row as far from the north lies
   kElsewhere
 };
-// By the header's bounding sphere: its centre must lie within the sphere around the tile's rectangle.
-// Roots are not told apart: their spheres overlap. REQUIRES: a key in the scheme.
+// By the header's bounding sphere: its centre must lie within the sphere around the tile's rectangle,
+// and not be nearer to the mirrored row's. Tiles that reach around half of the globe (roots,
+// and zoom 1 of EPSG:3857) are not told apart.
+// REQUIRES: a key in the scheme.
 TilePlace place_of_tile(const TilingScheme& scheme, const TileKey& key,
                         const QuantizedMeshHeader& header);
 

@@ -91,7 +91,18 @@ void TileCheck::ask_for_sample(std::size_t limit) {
   std::erase_if(roots, [this](const TileKey& root) { return !layer_.lists(root); });
   for (const TileKey& key : sample_tiles(layer_.available, roots, limit)) {
     if (has_given_up()) return;
+    if (log_.has(CheckKind::kManyRanges)) look_for_unlisted_parents(key);
     ask_for(key);
+  }
+}
+
+void TileCheck::look_for_unlisted_parents(const TileKey& key) {
+  for (TileKey child = key; child.zoom > 1; child = parent_of(child)) {
+    if (layer_.lists(parent_of(child))) continue;
+    add(CheckKind::kAvailableHole, tile_address(layer_, folder_, key).value().text(),
+        fmt::format("{} is listed, {} above it is not", to_string(key),
+                    to_string(parent_of(child))));
+    return;
   }
 }
 

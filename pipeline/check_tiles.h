@@ -52,6 +52,7 @@ class TileCheck {
   bool has_given_up() const;
   std::optional<QuantizedMesh> ask_for(const TileKey& key);
   std::optional<QuantizedMesh> look_at_tile(const TileKey& key, const HttpAnswer& answer);
+  void look_for_unlisted_parents(const TileKey& key);
   void look_at_missing(const TileKey& key, const HttpAnswer& answer);
   bool lies_at_mirrored_name(const TileKey& key);
   void look_at_place(const TileKey& key, const QuantizedMesh& mesh, const std::string& url);

@@ -54,9 +54,9 @@ def is_leaf(path):
     return path == LEAF
 
 
-def status(choose, number):
-    def change(answer, _):
-        if choose(answer.path):
+def status(choose, number, command="GET"):
+    def change(answer, handler):
+        if handler.command == command and choose(answer.path):
             answer.status = number
         return answer
     return change
@@ -71,12 +71,6 @@ def start_page(choose):
             answer.body = b"\n<!DOCTYPE html><html><body>Welcome</body></html>"
         return answer
     return change
-
-
-def no_head(answer, handler):
-    if handler.command == "HEAD":
-        answer.status = 405
-    return answer
 
 
 def cut(choose):
@@ -185,6 +179,9 @@ def cases():
                 ["gzip-not-announced"]),
         ("a header without gzip", ["gzip-announced-but-plain"], (), (), same, plain),
         answers("gzip twice", body(is_tile, gzip.compress), ["gzip-twice"]),
+        answers("gzip twice and announced twice",
+                lambda a, h: headers(Content_Encoding=["gzip", "gzip"])(
+                    body(is_tile, gzip.compress)(a, h), h), (), ["gzip-twice-announced"]),
         answers("damaged gzip", body(is_leaf, lambda b: b[:100] + b"\0\0\0\0" + b[104:]),
                 ["gzip-damaged"]),
         answers("brotli that nobody asked for", headers(Content_Encoding="br"),
@@ -285,7 +282,7 @@ def cases():
         answers("a media type with parameters",
                 headers(Content_Type=MEDIA_TYPE + ";extensions=octvertexnormals")),
         answers("no caching", headers(Cache_Control=None), (), (), ["no-caching"]),
-        answers("no HEAD", no_head, (), (), ["head-refused"]),
+        answers("no HEAD", status(every, 405, "HEAD"), (), (), ["head-refused"]),
         answers("redirections", redirect_tiles, (), (), ["tile-redirect"]),
         files("an unlisted tile", lambda: {**FILES, "5/32/22.terrain": FILES[LEAF]}, (), (),
               ["unlisted-tile"]),

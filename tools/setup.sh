@@ -2,9 +2,11 @@
 # Installs what qmpipe needs on a bare Debian 12: compiler, build tools and libraries.
 # Needs root (or sudo). Safe to run again: packages that are there are left alone.
 #   tools/setup.sh          what a build and its tests need
-#   tools/setup.sh --dev    also clang-format, clang-tidy, the fuzzer runtime, valgrind and perf
+#   tools/setup.sh --dev    also clang-format, clang-tidy, the fuzzer runtime, valgrind, perf, and the web
+#                           servers that docs/SERVING.md is tried with
 set -euo pipefail
 
+# libcurl (for `qmpipe check`) comes with libgdal-dev, in the flavour that is there or its first choice.
 build_packages=(
   g++ cmake ninja-build ccache git ca-certificates pkg-config
   libtbb-dev libgdal-dev libproj-dev libhdf5-dev libzstd-dev libdeflate-dev libmeshoptimizer-dev libcgal-dev
@@ -13,7 +15,7 @@ build_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev
   gdal-bin python3 sqlite3
 )
-dev_packages=(clang-14 clang-format-14 clang-tidy-14 libclang-rt-14-dev valgrind linux-perf)
+dev_packages=(clang-14 clang-format-14 clang-tidy-14 libclang-rt-14-dev valgrind linux-perf nginx-core apache2-bin caddy)
 
 packages=("${build_packages[@]}")
 if [ "${1:-}" = "--dev" ]; then packages+=("${dev_packages[@]}"); fi
@@ -34,5 +36,6 @@ if [ "$(id -u)" -ne 0 ]; then
 fi
 echo "setup: installing ${missing[*]}"
 "${as_root[@]}" apt-get update -qq
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+# RUNLEVEL=1: the packages' scripts start no service (invoke-rc.d takes the machine for one in single-user mode).
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive RUNLEVEL=1 apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
 echo "setup: done"
