@@ -38,7 +38,7 @@ inline constexpr std::array<CheckKindText, kCheckKinds> kCheckTexts = {{
      "CesiumJS does not unzip by itself: \"RangeError: Invalid typed array length\", \"Failed to "
      "obtain terrain tile\", and the globe stays bare",
      "Make the server send \"Content-Encoding: gzip\" with these files (docs/SERVING.md), or build "
-     "or unpack the set with --gzip none."},
+     "the set with --gzip none."},
     {CheckKind::kGzipAnnounced, "gzip-announced-but-plain", CheckSeverity::kFault,
      "the browser fails to unzip the answer (\"net::ERR_CONTENT_DECODING_FAILED\")",
      "Do not send \"Content-Encoding: gzip\" with files that are not gzipped."},

@@ -73,8 +73,10 @@ Sphere sphere_of(const RectangleDeg& rectangle, double low_m, double high_m) {
   std::vector<Vec3> points;
   for (int i = 0; i <= kSteps; ++i) {
     for (int j = 0; j <= kSteps; ++j) {
-      const double longitude_deg = std::lerp(rectangle.west_deg, rectangle.east_deg, i / 8.0);
-      const double latitude_deg = std::lerp(rectangle.south_deg, rectangle.north_deg, j / 8.0);
+      const double longitude_deg =
+          std::lerp(rectangle.west_deg, rectangle.east_deg, static_cast<double>(i) / kSteps);
+      const double latitude_deg =
+          std::lerp(rectangle.south_deg, rectangle.north_deg, static_cast<double>(j) / kSteps);
       for (const double height_m : {low_m, high_m}) {
         points.push_back(to_ecef({longitude_deg, latitude_deg, height_m}));
       }

@@ -5,8 +5,13 @@ usage: check_hostile_server_test.py QMPIPE
 """
 import contextlib
 import gzip
+import os
 import pathlib
+import shutil
+import signal
 import socket
+import ssl
+import subprocess
 import sys
 import tempfile
 import threading
@@ -203,6 +208,36 @@ class HostileServer(unittest.TestCase):
         done, report = check(QMPIPE, "http://no-such-host.invalid/")
         self.assertEqual(done.returncode, 1)
         self.assertIn("cannot be resolved", report["findings"][0]["text"])
+
+    def test_a_certificate_that_nobody_vouches_for(self):
+        if not shutil.which("openssl"):
+            self.skipTest("openssl is not installed")
+        with tempfile.TemporaryDirectory(prefix="qmpipe-tls-") as folder:
+            key, certificate = f"{folder}/key.pem", f"{folder}/certificate.pem"
+            subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj",
+                            "/CN=localhost", "-keyout", key, "-out", certificate],
+                           check=True, capture_output=True)
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(certificate, key)
+
+            def greet(connection, _):
+                with contextlib.suppress(ssl.SSLError):
+                    context.wrap_socket(connection, server_side=True).close()
+
+            with raw_server(greet) as address:
+                done, report = check(QMPIPE, address.replace("http:", "https:"))
+        self.assertEqual((done.returncode, codes(report, "fault")), (1, ["no-answer"]))
+        self.assertIn("certificate is not trusted", report["findings"][0]["text"])
+
+    def test_an_interrupt_ends_it_at_once(self):
+        with raw_server(hangs) as address:
+            running = subprocess.Popen([QMPIPE, "check", address, "--timeout", "60"],
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                                       env={**os.environ, "no_proxy": "*"})
+            time.sleep(1)
+            running.send_signal(signal.SIGINT)
+            _, words = running.communicate(timeout=10)
+        self.assertEqual((running.returncode, words), (130, "qmpipe: interrupted\n"))
 
     def test_https_where_http_is_spoken(self):
         with serving(FILES) as address:

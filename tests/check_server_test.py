@@ -42,16 +42,16 @@ def body(choose, make):
     return change
 
 
-def every(_):
-    return True
-
-
 def is_layer(path):
     return path == "layer.json"
 
 
 def is_leaf(path):
     return path == LEAF
+
+
+def every(path):
+    return is_layer(path) or is_tile(path)
 
 
 def status(choose, number, command="GET"):
@@ -132,11 +132,6 @@ def without_extensions(tile):
 def south_for_north(tile):
     z_m, = struct.unpack_from("<d", tile, 48)
     return patched(48, "<d", -z_m)(tile)
-
-
-def other_tile(path, of):
-    """One tile's bytes under another's name."""
-    return {**FILES, path: FILES[of]}
 
 
 # (name, faults, warnings, hints, change of the answers, the files)
@@ -238,8 +233,8 @@ def cases():
         answers("a tile forbidden", status(is_leaf, 403), ["tile-missing"]),
         answers("an empty tile", lambda a, h: headers(is_leaf, Content_Encoding=None)(
             body(is_leaf, lambda _: b"")(a, h), h), ["tile-empty"]),
-        (("a page for missing tiles", ["html-instead-of-tile"], (), ["soft-404"],
-          start_page(lambda a: a.status == 404), without(LEAF))),
+        ("a page for missing tiles", ["html-instead-of-tile"], (), ["soft-404"],
+         start_page(lambda a: a.status == 404), without(LEAF)),
         answers("a page for unlisted tiles", start_page(lambda a: a.status == 404), (), (),
                 ["soft-404"]),
         files("a truncated tile", lambda: leaf_changed(lambda tile: tile[:-7]),
@@ -267,7 +262,7 @@ def cases():
               ["watermask-absent"]),
         files("a sphere elsewhere", lambda: leaf_changed(patched(32, "<3d", 0, -6.4e6, 0)),
               ["tile-misplaced"]),
-        files("a neighbour's tile", lambda: other_tile(LEAF, "4/17/12.terrain"),
+        files("a neighbour's tile", lambda: {**FILES, LEAF: FILES["4/17/12.terrain"]},
               ["tile-misplaced"]),
         files("rows from the north", rows_from_north, ["rows-flipped"]),
         files("rows from the south, told otherwise", lambda: with_layer(FILES, scheme="slippyMap"),

@@ -106,7 +106,7 @@ HeaderList list_of(const std::vector<HttpHeader>& headers) {
 
 std::string words_for(CURLcode code, const std::string& detail, double timeout_s,
                       const Incoming& incoming) {
-  const std::string why = detail.empty() ? curl_easy_strerror(code) : detail;
+  std::string why = detail.empty() ? curl_easy_strerror(code) : detail;
   switch (code) {
     case CURLE_COULDNT_RESOLVE_HOST:
       return "the host's name cannot be resolved: " + why;
@@ -171,7 +171,7 @@ struct HttpClient::Impl {
     set(CURLOPT_XFERINFODATA, &incoming);
   }
 
-  void describe(HttpAnswer& answer) {
+  void describe(HttpAnswer& answer) const {
     long status = 0;
     long redirects = 0;
     const char* url = nullptr;
