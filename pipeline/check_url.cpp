@@ -2,13 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "formats/errors.h"
-#include "formats/tile_set.h"
 #include "pipeline/check_answer.h"
 #include "pipeline/check_layer.h"
-#include "pipeline/check_sample.h"
 #include "pipeline/check_tiles.h"
 #include "pipeline/web_address.h"
 #include "scheduler/check.h"
