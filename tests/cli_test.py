@@ -49,11 +49,11 @@ class Cli(unittest.TestCase):
     def test_help_names_every_command(self):
         done = run("--help")
         self.assertEqual(done.returncode, 0)
-        for command in ("build", "verify", "compare", "info", "tin", "synth"):
+        for command in ("build", "verify", "check", "compare", "info", "tin", "synth"):
             self.assertIn(command, done.stdout)
 
     def test_each_command_has_help_with_an_example(self):
-        for command in ("build", "verify", "compare", "info", "tin", "synth"):
+        for command in ("build", "verify", "check", "compare", "info", "tin", "synth"):
             done = run(command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("qmpipe " + command, done.stdout)

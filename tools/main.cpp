@@ -10,6 +10,7 @@
 #include "pipeline/progress.h"
 #include "pipeline/version.h"
 #include "tools/command_build.h"
+#include "tools/command_check.h"
 #include "tools/command_compare.h"
 #include "tools/command_info.h"
 #include "tools/command_serve.h"
@@ -41,6 +42,7 @@ int run(int argc, char** argv) {
   qmpipe::register_build(app, action);
   qmpipe::register_verify(app, action);
   qmpipe::register_serve(app, action);
+  qmpipe::register_check(app, action);
   qmpipe::register_compare(app, action);
   qmpipe::register_info(app, action);
   qmpipe::register_tin(app, action);

@@ -8,6 +8,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
+# libcurl (for `qmpipe check`) comes with libgdal-dev, in the flavour that is there or its first choice.
 build_packages=(
   g++ cmake ninja-build ccache git ca-certificates pkg-config
   libtbb-dev libgdal-dev libproj-dev libhdf5-dev libzstd-dev libdeflate-dev libmeshoptimizer-dev libcgal-dev
@@ -16,7 +17,10 @@ build_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev
   gdal-bin python3 sqlite3
 )
-dev_packages=(chromium clang-14 clang-format-14 clang-tidy-14 libclang-rt-14-dev valgrind linux-perf)
+dev_packages=(
+  chromium nginx-core apache2-bin caddy
+  clang-14 clang-format-14 clang-tidy-14 libclang-rt-14-dev valgrind linux-perf
+)
 
 packages=("${build_packages[@]}")
 if [ "${1:-}" = "--dev" ]; then packages+=("${dev_packages[@]}"); fi
