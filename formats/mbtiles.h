@@ -21,11 +21,16 @@ namespace qmpipe {
 //
 // Guarantees: what sync() returned from outlives a kill and a power cut. The same tiles in the same
 // order make the same bytes, however often the run was interrupted and wherever sync() was called
-// (for one version of SQLite). A tile that is there with the same bytes is not written again.
+// (for one version of SQLite); after a tile was replaced by another, the same tiles, but maybe not the
+// same bytes. A tile that is there with the same bytes is not written again. One process at a time has
+// a working file; sync() and close() notice when it was removed or replaced. What was written since
+// the last sync() is gone when the sink is destroyed without close(). After an error nothing works.
 std::unique_ptr<TileSink> open_mbtiles_sink(const std::filesystem::path& path, Overwrite overwrite);
 
 // Goes on with PATH.qmpipe-tmp, or starts it when it is gone; an older file at `path` stays until
-// close(). Throws IoError when it is not ours or damaged.
+// close(). Where there is no working file, the file at `path` may be what a run finished before it
+// was killed: its tiles are taken for there, and a close() without a write() before it asks for its
+// layer.json. Throws IoError when the working file is not ours or damaged.
 std::unique_ptr<TileSink> resume_mbtiles_sink(const std::filesystem::path& path);
 
 // How a file numbers its rows; ours and the specification's is kTms.

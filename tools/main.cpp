@@ -1,5 +1,5 @@
 // The program's one entry: parses, runs the command, and turns every error into a message and an
-// exit code (0 done, 1 failed, 2 usage, 3 verify found faults, 130 interrupted).
+// exit code (0 done, 1 failed, 2 usage, 3 verify found faults or diff differences, 130 interrupted).
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>
@@ -11,6 +11,8 @@
 #include "pipeline/version.h"
 #include "tools/command_build.h"
 #include "tools/command_compare.h"
+#include "tools/command_convert.h"
+#include "tools/command_diff.h"
 #include "tools/command_info.h"
 #include "tools/command_synth.h"
 #include "tools/command_tin.h"
@@ -40,6 +42,8 @@ int run(int argc, char** argv) {
   qmpipe::register_build(app, action);
   qmpipe::register_verify(app, action);
   qmpipe::register_compare(app, action);
+  qmpipe::register_convert(app, action);
+  qmpipe::register_diff(app, action);
   qmpipe::register_info(app, action);
   qmpipe::register_tin(app, action);
   qmpipe::register_synth(app, action);
