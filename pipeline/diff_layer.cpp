@@ -52,7 +52,7 @@ class Comparer {
       for (const auto& item : object->items()) keys.insert(item.key());
     }
     for (const std::string& key : keys) {
-      compare(path.empty() ? key : path + "." + key, find(a, key), find(b, key));
+      compare(path.empty() ? key : fmt::format("{}.{}", path, key), find(a, key), find(b, key));
     }
   }
 
