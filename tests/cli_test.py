@@ -3,11 +3,13 @@
 
 usage: cli_test.py QMPIPE
 """
+import contextlib
 import json
 import os
 import pathlib
 import re
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -49,11 +51,13 @@ class Cli(unittest.TestCase):
     def test_help_names_every_command(self):
         done = run("--help")
         self.assertEqual(done.returncode, 0)
-        for command in ("build", "verify", "compare", "info", "tin", "synth"):
+        for command in ("build", "verify", "compare", "info", "tin", "synth", "convert", "pack",
+                        "unpack", "diff"):
             self.assertIn(command, done.stdout)
 
     def test_each_command_has_help_with_an_example(self):
-        for command in ("build", "verify", "compare", "info", "tin", "synth"):
+        for command in ("build", "verify", "compare", "info", "tin", "synth", "convert", "pack",
+                        "unpack", "diff"):
             done = run(command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("qmpipe " + command, done.stdout)
@@ -272,6 +276,95 @@ class Cli(unittest.TestCase):
         self.assertEqual(process.returncode, 130, stderr)
         self.assertRegex(stderr, r"stopped after \d+ of \d+ tiles")
         self.assertFalse((out / "layer.json").exists())
+
+    def test_pack_convert_and_unpack_give_the_same_set_back(self):
+        packed = self.root / "packed.mbtiles"
+        archive = self.root / "packed.pmtiles"
+        back = self.root / "unpacked"
+        for arguments in (("pack", self.tiles, "-o", packed),
+                          ("convert", packed, "-o", archive),
+                          ("unpack", archive, "-o", back)):
+            done = run(*arguments, "--json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            report = json.loads(done.stdout)
+            self.assertEqual(report["tiles"], len(list(self.tiles.glob("*/*/*.terrain"))))
+            self.assertEqual((report["repacked_tiles"], report["notes"]), (0, []))
+        names = sorted(p.relative_to(back) for p in back.rglob("*") if p.is_file())
+        self.assertEqual(names, sorted(p.relative_to(self.tiles) for p in self.tiles.rglob("*")
+                                       if p.is_file() and p.name != "report.json"))
+        for name in names:
+            self.assertEqual((back / name).read_bytes(), (self.tiles / name).read_bytes())
+        for form in (packed, archive, back):
+            done = run("diff", self.tiles, form)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            done = run("verify", form)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        plain = self.root / "plain.pmtiles"
+        done = run("pack", archive, "-o", plain, "--gzip", "none")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("diff", archive, plain, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(done.stdout)
+        self.assertTrue(report["same"])
+        self.assertEqual(report["total"]["same_unpacked"], report["total"]["tiles_a"])
+
+    def test_rows_from_the_north_are_turned(self):
+        packed = self.root / "south.mbtiles"
+        done = run("pack", self.tiles, "-o", packed)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        flipped = self.root / "north.mbtiles"
+        with contextlib.closing(sqlite3.connect(packed)) as tms, \
+                contextlib.closing(sqlite3.connect(flipped)) as xyz, xyz:
+            xyz.execute("CREATE TABLE metadata (name TEXT, value TEXT)")
+            xyz.execute("CREATE TABLE tiles (zoom_level INTEGER, tile_column INTEGER,"
+                        " tile_row INTEGER, tile_data BLOB)")
+            xyz.executemany("INSERT INTO metadata VALUES (?, ?)",
+                            tms.execute("SELECT name, value FROM metadata"))
+            xyz.executemany("INSERT INTO tiles VALUES (?, ?, ?, ?)",
+                            tms.execute("SELECT zoom_level, tile_column,"
+                                        " (1 << zoom_level) - 1 - tile_row, tile_data FROM tiles"))
+        out = self.root / "turned"
+        done = run("convert", flipped, "-o", out, "--rows", "xyz")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("diff", self.tiles, out)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_diff_tells_what_differs(self):
+        coarse = self.root / "coarse"
+        done = run("build", self.dem, "-o", coarse, "--tolerance", "60000")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("diff", self.tiles, coarse, "--max", 2)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("layer.json qmpipe.", done.stdout)
+        self.assertRegex(done.stdout, r"(?m)^different \d+/\d+/\d+: \d+ / \d+ vertices")
+        self.assertRegex(done.stdout, r"(?m)^\d+ more different not shown$")
+        self.assertEqual(run("diff", self.tiles, coarse, "--max", 2, "--threads", 1).stdout,
+                         done.stdout)
+        self.fails(1, "diff", self.tiles, self.root / "nowhere", says=["nowhere"])
+        self.fails(2, "diff", self.tiles)
+
+    def test_convert_refuses_with_the_remedy(self):
+        self.fails(2, "pack", self.tiles, "-o", self.root / "folder", says=[".mbtiles or .pmtiles"])
+        self.fails(2, "unpack", self.tiles, "-o", self.root / "x.mbtiles", says=["convert"])
+        self.fails(2, "convert", self.tiles, "-o", self.tiles, "--overwrite",
+                   says=["the output is the input"])
+        self.fails(2, "convert", self.tiles / "layer.json", "-o", str(self.tiles) + "/",
+                   "--overwrite", says=["the output is the input"])
+        self.fails(2, "convert", self.tiles, "-o", self.root / "x.pmtiles", "--gzip", "13",
+                   says=["--gzip 13"])
+        self.fails(2, "convert", self.tiles, "-o", self.root / "x.pmtiles", "--rows", "xyz",
+                   says=["--rows"])
+        self.fails(2, "convert", self.tiles, "-o", self.root / "x.pmtiles", "--rows", "up")
+        self.fails(2, "convert", self.tiles)
+        self.fails(1, "convert", self.root / "nothing", "-o", self.root / "x.pmtiles",
+                   says=["nothing"])
+        taken = self.root / "taken.pmtiles"
+        taken.write_text("mine")
+        self.fails(1, "pack", self.tiles, "-o", taken, says=["--overwrite"])
+        self.assertEqual(taken.read_text(), "mine")
+        self.fails(1, "convert", taken, "-o", self.root / "x", says=["taken.pmtiles"])
+        self.assertFalse((self.root / "x").exists())
+        self.assertFalse((self.root / "x.pmtiles").exists())
 
     def test_verify_of_nothing_is_an_error(self):
         self.fails(1, "verify", self.root / "nothing-here", says=["nothing-here"])
