@@ -13,6 +13,7 @@
 #include "formats/gzip.h"
 #include "formats/mbtiles.h"
 #include "formats/pmtiles.h"
+#include "formats/quantized_mesh.h"
 #include "formats/tile_output.h"
 #include "formats/tile_path.h"
 
@@ -197,7 +198,11 @@ std::unique_ptr<TileSet> open_tile_set(const fs::path& path) {
 }
 
 Result<std::vector<std::uint8_t>> plain_tile_bytes(std::vector<std::uint8_t> stored) {
-  if (is_gzip(stored)) return gzip_decompress(stored, kLargestTileBytes);
+  if (is_gzip(stored)) {
+    auto plain = gzip_decompress(stored, kLargestTileBytes);
+    // A tile begins with a coordinate, whose bytes may look like gzip's.
+    if (plain || !decode(stored)) return plain;
+  }
   if (stored.size() > kLargestTileBytes) {
     return Error{fmt::format("the tile has {} bytes, more than the {} allowed", stored.size(),
                              kLargestTileBytes)};

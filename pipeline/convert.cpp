@@ -152,8 +152,8 @@ class Converter {
                       "qmpipe verify finds all such tiles; remove or rebuild them.");
       }
       if (!is_gzipped) is_gzipped = is_gzip(*tile.bytes);
-      are_mixed =
-          form_of(options_.output) == TileForm::kPmtiles && is_gzip(*tile.bytes) != *is_gzipped;
+      are_mixed = change == Change::kNone && form_of(options_.output) == TileForm::kPmtiles &&
+                  is_gzip(*tile.bytes) != *is_gzipped;
       if (are_mixed) return false;
       output.write(key, *tile.bytes);
       count_in(tile);
@@ -189,19 +189,20 @@ class Converter {
     Tile tile = {.bytes = input_.read(key)};
     if (!tile.bytes) return tile;
     tile.read_bytes = static_cast<std::int64_t>(tile.bytes->size());
-    const bool was_gzipped = is_gzip(*tile.bytes);
-    if (change == Change::kNone || (change == Change::kGzipPlainOnes && was_gzipped) ||
-        (change == Change::kUnpack && !was_gzipped)) {
+    if (change == Change::kNone) return tile;
+    auto plain = plain_tile_bytes(*tile.bytes);
+    if (change == Change::kGzipPlainOnes && (!plain || *plain != *tile.bytes)) return tile;
+    if (change == Change::kUnpack || !plain) {
+      tile.is_repacked = !plain || *plain != *tile.bytes;
+      tile.bytes = std::move(plain);
       return tile;
     }
     tile.is_repacked = true;
-    tile.bytes = plain_tile_bytes(std::move(*tile.bytes));
-    if (change == Change::kUnpack || !tile.bytes) return tile;
     std::optional<GzipCompressor>& compressor = compressors_.local();
     if (!compressor) {
       compressor.emplace(change == Change::kGzipAll ? options_.gzip_level : kLevelOfMixedSets);
     }
-    tile.bytes = compressor->compress(*tile.bytes);
+    tile.bytes = compressor->compress(*plain);
     return tile;
   }
 
