@@ -33,9 +33,11 @@ function keysOf(folder) {
     .map((match) => match.slice(1).map(Number));
 }
 
-// As the reader hands out tiles: unpacked.
+// As the reader hands out tiles: unpacked. Two bytes alone do not tell: a plain tile begins with a
+// coordinate.
 function plain(bytes) {
-  return bytes[0] === 0x1f && bytes[1] === 0x8b ? zlib.gunzipSync(bytes) : bytes;
+  const isGzip = bytes[0] === 0x1f && bytes[1] === 0x8b && bytes[2] === 8 && bytes[3] < 0x20;
+  return isGzip ? zlib.gunzipSync(bytes) : bytes;
 }
 
 const [archiveName, folder] = process.argv.slice(2);
