@@ -62,8 +62,7 @@ SqliteFile open_file(const std::filesystem::path& path) {
 MbtilesFile::MbtilesFile(std::filesystem::path path)
     : path_(std::move(path)), file_(open_file(path_)) {
   execute(kSettings);
-  execute("BEGIN EXCLUSIVE");
-  is_in_transaction_ = true;
+  begin();
   SqliteStatement any = prepare("SELECT 1 FROM sqlite_schema LIMIT 1");
   const bool is_new = !step(any);
   any.reset();
@@ -101,6 +100,7 @@ void MbtilesFile::read_hashes() {
     last_image_ = image.integer(0);
     image_with_hash_.emplace(static_cast<std::uint64_t>(image.integer(1)), last_image_);
   }
+  committed_images_ = last_image_;
 }
 
 void MbtilesFile::put(const TileKey& key, std::span<const std::uint8_t> bytes) {
@@ -213,7 +213,7 @@ void MbtilesFile::remove_unused_images() {
 
 void MbtilesFile::begin() {
   if (is_in_transaction_) return;
-  execute("BEGIN IMMEDIATE");
+  execute("BEGIN EXCLUSIVE");
   is_in_transaction_ = true;
 }
 
@@ -222,6 +222,7 @@ void MbtilesFile::commit() {
   if (!is_in_transaction_) return;
   execute("COMMIT");
   is_in_transaction_ = false;
+  committed_images_ = last_image_;
 }
 
 SqliteStatement MbtilesFile::prepare(const std::string& sql) {

@@ -91,6 +91,15 @@ class MbtilesSink final : public TileSink {
       : path_(std::move(path)), finished_(std::move(finished)) {
     if (finished_ == nullptr) start();
   }
+  ~MbtilesSink() override {
+    const bool is_litter = tiles_ != nullptr && !tiles_->holds_tiles() && file_->has_its_name();
+    tiles_.reset();
+    if (!is_litter) return;
+    ::unlink(working_path(path_).c_str());
+    ::unlink((working_path(path_).string() + "-journal").c_str());
+  }
+  MbtilesSink(const MbtilesSink&) = delete;
+  MbtilesSink& operator=(const MbtilesSink&) = delete;
 
   void write(const TileKey& key, std::span<const std::uint8_t> bytes) override {
     const std::scoped_lock lock(mutex_);
@@ -187,6 +196,14 @@ class MbtilesSink final : public TileSink {
   bool is_closed_ = false;
 };
 
+// A folder could not be replaced when all is done.
+void require_no_folder(const fs::path& path) {
+  std::error_code code;
+  if (!fs::is_directory(path, code)) return;
+  throw IoError("cannot start a tile set in", path.string(), "it is a folder",
+                "Choose another name for the file.");
+}
+
 void require_absent(const fs::path& path) {
   std::error_code code;
   if (!fs::exists(path, code) && !code) return;
@@ -198,6 +215,7 @@ void require_absent(const fs::path& path) {
 }  // namespace
 
 std::unique_ptr<TileSink> open_mbtiles_sink(const fs::path& path, Overwrite overwrite) {
+  require_no_folder(path);
   if (overwrite == Overwrite::kNo) require_absent(path);
   if (path.has_parent_path()) make_folders(path.parent_path());
   remove_working_file(path);
@@ -205,6 +223,7 @@ std::unique_ptr<TileSink> open_mbtiles_sink(const fs::path& path, Overwrite over
 }
 
 std::unique_ptr<TileSink> resume_mbtiles_sink(const fs::path& path) {
+  require_no_folder(path);
   if (path.has_parent_path()) make_folders(path.parent_path());
   std::unique_ptr<TileSet> finished;
   if (!fs::exists(working_path(path)) && fs::exists(path)) {
