@@ -38,8 +38,9 @@ std::unique_ptr<TileSink> open_mbtiles_sink(const std::filesystem::path& path, O
 
 // Goes on with PATH.qmpipe-tmp, or starts it when it is gone; an older file at `path` stays until
 // close(). Where there is no working file, the file at `path` may be what a run finished before it
-// was killed: its tiles are taken for there, and a close() without a write() before it asks for its
-// layer.json. Throws IoError when the working file is not ours or damaged.
+// was killed: its tiles are taken for there, and close() asks for the same layer.json. A write()
+// starts a working file after all, or throws IoError when has() has just said yes. Throws IoError
+// when the working file is not ours or damaged.
 std::unique_ptr<TileSink> resume_mbtiles_sink(const std::filesystem::path& path);
 
 // How a file numbers its rows; ours and the specification's is kTms.

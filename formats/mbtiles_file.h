@@ -77,6 +77,7 @@ class MbtilesFile {
   std::int64_t committed_images_ = 0;
   bool is_in_transaction_ = false;
   std::string failure_;
+  std::string failure_remedy_;
 };
 
 }  // namespace qmpipe

@@ -106,6 +106,7 @@ class MbtilesSink final : public TileSink {
     QMPIPE_CHECK(!is_closed_);
     if (tiles_ == nullptr) {
       // A run that finished the file would have no tile left to write: it is an older one.
+      if (is_counted_on_) refuse_finished();
       finished_.reset();
       start();
     }
@@ -122,8 +123,9 @@ class MbtilesSink final : public TileSink {
   bool has(const TileKey& key) const override {
     const std::scoped_lock lock(mutex_);
     if (tiles_ != nullptr) return tiles_->has(key);
-    return finished_ != nullptr &&
-           std::binary_search(finished_->keys().begin(), finished_->keys().end(), key);
+    is_counted_on_ = finished_ != nullptr &&
+                     std::binary_search(finished_->keys().begin(), finished_->keys().end(), key);
+    return is_counted_on_;
   }
 
   void close(const std::string& layer_json) override {
@@ -178,8 +180,11 @@ class MbtilesSink final : public TileSink {
   // A run was killed after it had finished the file and before it could tell so.
   void require_finished_with(const std::string& layer_json) const {
     const Result<std::string> text = finished_->layer_text();
-    if (text && *text == layer_json) return;
-    throw IoError("cannot finish", path_.string(),
+    if (!text || *text != layer_json) refuse_finished();
+  }
+
+  [[noreturn]] void refuse_finished() const {
+    throw IoError("cannot go on with", path_.string(),
                   fmt::format("the unfinished {} is gone, and {} is another tile set",
                               working_path(path_).string(), path_.string()),
                   "Run the same command with --overwrite to start over.");
@@ -189,6 +194,8 @@ class MbtilesSink final : public TileSink {
   mutable std::mutex mutex_;
   // The file at `path_`, as long as it may be what an earlier run has finished.
   std::unique_ptr<TileSet> finished_;
+  // It was said of the last tile asked for that it is there: whoever writes others counts on it.
+  mutable bool is_counted_on_ = false;
   // Closed in the order: tiles_, file_.
   std::unique_ptr<OpenFile> file_;
   std::unique_ptr<MbtilesFile> tiles_;
