@@ -92,14 +92,20 @@ void MbtilesFile::require_own_schema() {
       "SELECT count(*) FROM sqlite_schema WHERE (type='table' AND name IN ('map', 'images', "
       "'metadata')) OR (type='view' AND name='tiles')");
   if (has_id && step(tables) && tables.integer(0) == 4) return;
-  fail(Error{"it is no unfinished tile set of this program"});
+  fail(Error{"it is no unfinished tile set of this program; remove it, or pass --overwrite"});
 }
 
 // Columns before the blob: the blobs' own pages are not read.
 void MbtilesFile::read_hashes() {
   SqliteStatement image = prepare("SELECT tile_id, content_hash FROM images ORDER BY tile_id");
+  // Numbers are given one by one, and no image takes less than a byte.
+  const auto most = static_cast<std::int64_t>(std::filesystem::file_size(path_));
   while (step(image)) {
     last_image_ = image.integer(0);
+    if (last_image_ < 1 || last_image_ > most) {
+      fail(Error{
+          fmt::format("image {} cannot be; remove the file, or pass --overwrite", last_image_)});
+    }
     image_with_hash_.emplace(static_cast<std::uint64_t>(image.integer(1)), last_image_);
   }
   committed_images_ = last_image_;
