@@ -102,6 +102,73 @@ class Cli(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertGreater((self.root / name).stat().st_size, 500)
 
+    def test_mbtiles_hold_what_the_folder_holds(self):
+        packed = self.root / "packed.mbtiles"
+        done = run("build", self.dem, "-o", packed, "--name", "tiles")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        files = sorted(self.tiles.glob("*/*/*.terrain"))
+        with contextlib.closing(sqlite3.connect(packed)) as database:
+            self.assertEqual(database.execute("PRAGMA integrity_check").fetchone(), ("ok",))
+            rows = database.execute("SELECT zoom_level, tile_column, tile_row, tile_data FROM tiles")
+            found = {"/".join(map(str, row[:3])): row[3] for row in rows}
+            layer, = database.execute(
+                "SELECT value FROM metadata WHERE name = 'layer.json'").fetchone()
+        expected = {"/".join(path.with_suffix("").parts[-3:]): path.read_bytes() for path in files}
+        self.assertEqual(found, expected)
+        self.assertEqual(layer, (self.tiles / "layer.json").read_text())
+        self.assertEqual(json.loads((self.root / "packed.mbtiles.report.json").read_text())["tiles"],
+                         len(files))
+        counted = subprocess.run(["sqlite3", packed, "SELECT count(*) FROM tiles"],
+                                 capture_output=True, text=True, check=True).stdout
+        self.assertEqual(int(counted), len(files))
+        done = run("verify", packed, "--source", self.dem)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("0 faults", done.stdout)
+
+    def test_info_of_mbtiles_and_of_a_tile_in_a_set(self):
+        packed = self.root / "info.mbtiles"
+        run("build", self.dem, "-o", packed)
+        as_file = json.loads(run("info", packed, "--json").stdout)
+        as_folder = json.loads(run("info", self.tiles, "--json").stdout)
+        self.assertEqual(as_file["zooms"], as_folder["zooms"])
+        self.assertEqual(as_file["complaints"], [])
+        self.assertEqual(as_file["layer"]["name"], "info")
+        tile = max(self.tiles.glob("*/*/*.terrain"), key=lambda p: p.stat().st_size)
+        key = "/".join(tile.with_suffix("").parts[-3:])
+        expected = json.loads(run("info", tile, "--json").stdout)
+        for place in (packed, self.tiles):
+            found = json.loads(run("info", place, "--key", key, "--json").stdout)
+            self.assertEqual(found.pop("key"), key)
+            self.assertEqual({**found, "path": ""}, {**expected, "path": ""})
+        self.assertIn(f"info.mbtiles: tile {key}", run("info", packed, "--key", key).stdout)
+        meshes = []
+        for number, place in enumerate(([tile], [packed, "--key", key], [self.tiles, "--key", key])):
+            mesh = self.root / f"in-set-{number}.ply"
+            done = run("info", *place, "--mesh", mesh)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            meshes.append(mesh.read_bytes())
+        self.assertEqual(meshes, [meshes[0]] * 3)
+        self.fails(1, "info", packed, "--key", "9/0/0", says=["there is no tile 9/0/0"])
+        self.fails(2, "info", packed, "--mesh", self.root / "x.ply", says=["--key"])
+        self.fails(2, "info", tile, "--key", key, says=["--key"])
+        self.fails(2, "info", packed, "--key", "9/0", says=["zoom/x/y"])
+
+    def test_pmtiles_are_no_output_of_a_build(self):
+        out = self.root / "out.pmtiles"
+        self.fails(2, "build", self.dem, "-o", out, says=["qmpipe convert"])
+        self.assertFalse(out.exists())
+
+    def test_what_is_no_mbtiles_file_is_refused(self):
+        fake = self.root / "fake.mbtiles"
+        fake.write_text("no database")
+        for command in ("info", "verify"):
+            self.fails(1, command, fake, says=["fake.mbtiles", "no SQLite file"])
+        # The name does not matter where the first bytes tell.
+        run("build", self.dem, "-o", self.root / "real.mbtiles")
+        renamed = self.root / "real.bin"
+        (self.root / "real.mbtiles").rename(renamed)
+        self.assertEqual(run("verify", renamed).returncode, 0)
+
     def test_tin_writes_one_mesh_and_its_errors(self):
         for name in ("tin.ply", "tin.obj", "tin.glb", "tin.stl"):
             done = run("tin", self.dem, "-o", self.root / name, "--tolerance", "20", "--json")
@@ -175,6 +242,13 @@ class Cli(unittest.TestCase):
 
     def test_existing_output_is_refused_with_the_remedy(self):
         self.fails(1, "build", self.dem, "-o", self.tiles, says=["--overwrite"])
+        file = self.root / "there.mbtiles"
+        file.write_text("mine")
+        self.fails(1, "build", self.dem, "-o", file, says=["--overwrite"])
+        self.assertEqual(file.read_text(), "mine")
+        self.assertEqual(sorted(p.name for p in self.root.glob("there.*")), [file.name])
+        self.assertEqual(run("build", self.dem, "-o", file, "--overwrite").returncode, 0)
+        self.assertEqual(run("verify", file).returncode, 0)
 
     def test_overwrite_leaves_other_files_alone(self):
         out = self.root / "shared-folder"
