@@ -39,6 +39,8 @@ class MbtilesFile {
   void remove_unused_images();
   // What was put so far is on the disk.
   void commit();
+  // Whether any tile was committed, now or by another process before.
+  bool holds_tiles() const { return committed_images_ > 0; }
 
  private:
   void make_schema();
@@ -72,8 +74,10 @@ class MbtilesFile {
   // hash64() of an image's bytes to its id. Of images with one hash the first alone is found again.
   std::unordered_map<std::uint64_t, std::int64_t> image_with_hash_;
   std::int64_t last_image_ = 0;
+  std::int64_t committed_images_ = 0;
   bool is_in_transaction_ = false;
   std::string failure_;
+  std::string failure_remedy_;
 };
 
 }  // namespace qmpipe

@@ -91,12 +91,22 @@ class MbtilesSink final : public TileSink {
       : path_(std::move(path)), finished_(std::move(finished)) {
     if (finished_ == nullptr) start();
   }
+  ~MbtilesSink() override {
+    const bool is_litter = tiles_ != nullptr && !tiles_->holds_tiles() && file_->has_its_name();
+    tiles_.reset();
+    if (!is_litter) return;
+    ::unlink(working_path(path_).c_str());
+    ::unlink((working_path(path_).string() + "-journal").c_str());
+  }
+  MbtilesSink(const MbtilesSink&) = delete;
+  MbtilesSink& operator=(const MbtilesSink&) = delete;
 
   void write(const TileKey& key, std::span<const std::uint8_t> bytes) override {
     const std::scoped_lock lock(mutex_);
     QMPIPE_CHECK(!is_closed_);
     if (tiles_ == nullptr) {
       // A run that finished the file would have no tile left to write: it is an older one.
+      if (is_counted_on_) refuse_finished();
       finished_.reset();
       start();
     }
@@ -113,8 +123,9 @@ class MbtilesSink final : public TileSink {
   bool has(const TileKey& key) const override {
     const std::scoped_lock lock(mutex_);
     if (tiles_ != nullptr) return tiles_->has(key);
-    return finished_ != nullptr &&
-           std::binary_search(finished_->keys().begin(), finished_->keys().end(), key);
+    is_counted_on_ = finished_ != nullptr &&
+                     std::binary_search(finished_->keys().begin(), finished_->keys().end(), key);
+    return is_counted_on_;
   }
 
   void close(const std::string& layer_json) override {
@@ -169,8 +180,11 @@ class MbtilesSink final : public TileSink {
   // A run was killed after it had finished the file and before it could tell so.
   void require_finished_with(const std::string& layer_json) const {
     const Result<std::string> text = finished_->layer_text();
-    if (text && *text == layer_json) return;
-    throw IoError("cannot finish", path_.string(),
+    if (!text || *text != layer_json) refuse_finished();
+  }
+
+  [[noreturn]] void refuse_finished() const {
+    throw IoError("cannot go on with", path_.string(),
                   fmt::format("the unfinished {} is gone, and {} is another tile set",
                               working_path(path_).string(), path_.string()),
                   "Run the same command with --overwrite to start over.");
@@ -180,12 +194,22 @@ class MbtilesSink final : public TileSink {
   mutable std::mutex mutex_;
   // The file at `path_`, as long as it may be what an earlier run has finished.
   std::unique_ptr<TileSet> finished_;
+  // It was said of the last tile asked for that it is there: whoever writes others counts on it.
+  mutable bool is_counted_on_ = false;
   // Closed in the order: tiles_, file_.
   std::unique_ptr<OpenFile> file_;
   std::unique_ptr<MbtilesFile> tiles_;
   std::atomic<const OpenFile*> file_to_sync_ = nullptr;
   bool is_closed_ = false;
 };
+
+// A folder could not be replaced when all is done.
+void require_no_folder(const fs::path& path) {
+  std::error_code code;
+  if (!fs::is_directory(path, code)) return;
+  throw IoError("cannot start a tile set in", path.string(), "it is a folder",
+                "Choose another name for the file.");
+}
 
 void require_absent(const fs::path& path) {
   std::error_code code;
@@ -198,6 +222,7 @@ void require_absent(const fs::path& path) {
 }  // namespace
 
 std::unique_ptr<TileSink> open_mbtiles_sink(const fs::path& path, Overwrite overwrite) {
+  require_no_folder(path);
   if (overwrite == Overwrite::kNo) require_absent(path);
   if (path.has_parent_path()) make_folders(path.parent_path());
   remove_working_file(path);
@@ -205,6 +230,7 @@ std::unique_ptr<TileSink> open_mbtiles_sink(const fs::path& path, Overwrite over
 }
 
 std::unique_ptr<TileSink> resume_mbtiles_sink(const fs::path& path) {
+  require_no_folder(path);
   if (path.has_parent_path()) make_folders(path.parent_path());
   std::unique_ptr<TileSet> finished;
   if (!fs::exists(working_path(path)) && fs::exists(path)) {

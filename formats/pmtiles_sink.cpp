@@ -94,9 +94,8 @@ class PmtilesSink final : public TileSink {
           fmt::format("it has {} bytes, and an archive's tiles have 1 to 2^32 - 1", bytes.size()),
           "Remove the tile from the set, or choose another form.");
     }
-    const bool is_gzipped = is_gzip(bytes);
-    QMPIPE_CHECK(entries_.empty() || is_gzipped == are_gzipped_);
-    are_gzipped_ = is_gzipped;
+    // One plain tile in many millions looks gzipped; not all of them do.
+    are_gzipped_ = are_gzipped_ && is_gzip(bytes);
     const std::uint64_t offset = stored_at(bytes);
     if (!entries_.empty() && continues(entries_.back(), id, offset)) {
       ++entries_.back().run_length;
@@ -204,7 +203,7 @@ class PmtilesSink final : public TileSink {
   std::unordered_map<std::uint64_t, PmtilesSection> places_;
   std::uint64_t tile_bytes_ = 0;
   std::uint64_t content_count_ = 0;
-  bool are_gzipped_ = false;
+  bool are_gzipped_ = true;
   bool is_closed_ = false;
 };
 

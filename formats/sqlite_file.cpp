@@ -155,6 +155,9 @@ std::string SqliteFile::remedy() const {
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       return "Wait for that run, or stop it.";
+    case SQLITE_CORRUPT:
+    case SQLITE_NOTADB:
+      return "The file is damaged: remove it, or pass --overwrite to start over.";
     case SQLITE_READONLY:
       return remedy_for_errno(EACCES);
     case SQLITE_IOERR:

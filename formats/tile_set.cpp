@@ -13,6 +13,7 @@
 #include "formats/gzip.h"
 #include "formats/mbtiles.h"
 #include "formats/pmtiles.h"
+#include "formats/quantized_mesh.h"
 #include "formats/tile_output.h"
 #include "formats/tile_path.h"
 
@@ -155,9 +156,14 @@ TileForm form_of_file(const fs::path& path) {
 }
 
 std::unique_ptr<TileSet> open_file_set(const fs::path& path) {
-  const TileForm form = form_of_file(path);
-  if (form == TileForm::kMbtiles) return open_mbtiles_set(path);
-  if (form == TileForm::kPmtiles) return open_pmtiles_set(path);
+  switch (form_of_file(path)) {
+    case TileForm::kMbtiles:
+      return open_mbtiles_set(path);
+    case TileForm::kPmtiles:
+      return open_pmtiles_set(path);
+    case TileForm::kFolder:
+      break;
+  }
   throw IoError("cannot open the tile set", path.string(),
                 "it is neither a folder nor an .mbtiles or .pmtiles file", kRemedy);
 }
@@ -192,7 +198,11 @@ std::unique_ptr<TileSet> open_tile_set(const fs::path& path) {
 }
 
 Result<std::vector<std::uint8_t>> plain_tile_bytes(std::vector<std::uint8_t> stored) {
-  if (is_gzip(stored)) return gzip_decompress(stored, kLargestTileBytes);
+  if (is_gzip(stored)) {
+    auto plain = gzip_decompress(stored, kLargestTileBytes);
+    // A tile begins with a coordinate, whose bytes may look like gzip's.
+    if (plain || !decode(stored)) return plain;
+  }
   if (stored.size() > kLargestTileBytes) {
     return Error{fmt::format("the tile has {} bytes, more than the {} allowed", stored.size(),
                              kLargestTileBytes)};

@@ -74,9 +74,10 @@ class Converter {
     if (is_archive) sort_for_pmtiles(keys_, projection_);
     if (!copy(change_wanted(), fitted.text)) {
       QMPIPE_CHECK(copy(Change::kGzipPlainOnes, fitted.text));
-      note(fmt::format("{} of {} tiles were not gzipped and are now, at level {}: an archive has "
-                       "one compression for all",
-                       report_.repacked_tiles, keys_.size(), kLevelOfMixedSets));
+      note(
+          fmt::format("{} of {} tiles were not gzipped and are now, at level {}: an archive has "
+                      "one compression for all",
+                      report_.repacked_tiles, keys_.size(), kLevelOfMixedSets));
     }
     return std::move(report_);
   }
@@ -101,11 +102,11 @@ class Converter {
     const TilingScheme scheme(projection_);
     for (const TileKey& key : keys_) {
       if (scheme.contains(key)) continue;
-      throw IoError("cannot make", options_.output.string(),
-                    fmt::format("tile {} lies outside the tiling that layer.json names ({})",
-                                to_string(key),
-                                projection_ == Projection::kGeodetic ? "EPSG:4326" : "EPSG:3857"),
-                    "Correct \"projection\" in layer.json, or remove what is no tile of it.");
+      throw IoError(
+          "cannot make", options_.output.string(),
+          fmt::format("tile {} lies outside the tiling that layer.json names ({})", to_string(key),
+                      projection_ == Projection::kGeodetic ? "EPSG:4326" : "EPSG:3857"),
+          "Correct \"projection\" in layer.json, or remove what is no tile of it.");
     }
   }
 
@@ -151,7 +152,7 @@ class Converter {
                       "qmpipe verify finds all such tiles; remove or rebuild them.");
       }
       if (!is_gzipped) is_gzipped = is_gzip(*tile.bytes);
-      are_mixed = form_of(options_.output) == TileForm::kPmtiles &&
+      are_mixed = change == Change::kNone && form_of(options_.output) == TileForm::kPmtiles &&
                   is_gzip(*tile.bytes) != *is_gzipped;
       if (are_mixed) return false;
       output.write(key, *tile.bytes);
@@ -188,19 +189,20 @@ class Converter {
     Tile tile = {.bytes = input_.read(key)};
     if (!tile.bytes) return tile;
     tile.read_bytes = static_cast<std::int64_t>(tile.bytes->size());
-    const bool was_gzipped = is_gzip(*tile.bytes);
-    if (change == Change::kNone || (change == Change::kGzipPlainOnes && was_gzipped) ||
-        (change == Change::kUnpack && !was_gzipped)) {
+    if (change == Change::kNone) return tile;
+    auto plain = plain_tile_bytes(*tile.bytes);
+    if (change == Change::kGzipPlainOnes && (!plain || *plain != *tile.bytes)) return tile;
+    if (change == Change::kUnpack || !plain) {
+      tile.is_repacked = !plain || *plain != *tile.bytes;
+      tile.bytes = std::move(plain);
       return tile;
     }
     tile.is_repacked = true;
-    tile.bytes = plain_tile_bytes(std::move(*tile.bytes));
-    if (change == Change::kUnpack || !tile.bytes) return tile;
     std::optional<GzipCompressor>& compressor = compressors_.local();
     if (!compressor) {
       compressor.emplace(change == Change::kGzipAll ? options_.gzip_level : kLevelOfMixedSets);
     }
-    tile.bytes = compressor->compress(*tile.bytes);
+    tile.bytes = compressor->compress(*plain);
     return tile;
   }
 

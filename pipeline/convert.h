@@ -22,7 +22,7 @@ enum class Packing { kKeep, kPlain, kGzip };
 
 struct ConvertOptions {
   // Its name says the form.
-  std::filesystem::path output;
+  std::filesystem::path output = {};
   Overwrite overwrite = Overwrite::kNo;
   // DEFAULT: kKeep; a PMTiles archive has one compression for all, so that plain tiles among gzipped
   // ones are gzipped there, at level 7.

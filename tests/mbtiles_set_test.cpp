@@ -213,7 +213,7 @@ TEST_F(MbtilesSetTest, DamageAnywhereEndsInAnErrorAndNeverInACrash) {
     sink->close("{\"tiles\": []}");
   }
   const std::string sound = folder_.get("set.mbtiles");
-  const std::size_t page = 4096;
+  const std::size_t page = 8192;
   for (int run = 0; run < 400; ++run) {
     std::string damaged = sound;
     const auto flips = 1 + random() % 8;

@@ -83,7 +83,7 @@ TEST(TileSet, WhatIsNoTileSetIsRefusedWithARemedy) {
   EXPECT_THAT(message(folder.path() / "none"),
               HasSubstr("no such file or folder\n  Check the path"));
   EXPECT_THAT(message(folder.path() / "file"),
-              HasSubstr("neither a folder nor an .mbtiles file\n  Name the folder"));
+              HasSubstr("neither a folder nor an .mbtiles or .pmtiles file\n  Name the folder"));
   folder.put("layer.json", "{}");
   EXPECT_EQ(message(folder.path()), "opened");
 }

@@ -12,6 +12,8 @@
 #include "tools/command_build.h"
 #include "tools/command_check.h"
 #include "tools/command_compare.h"
+#include "tools/command_convert.h"
+#include "tools/command_diff.h"
 #include "tools/command_info.h"
 #include "tools/command_serve.h"
 #include "tools/command_synth.h"
@@ -44,6 +46,8 @@ int run(int argc, char** argv) {
   qmpipe::register_serve(app, action);
   qmpipe::register_check(app, action);
   qmpipe::register_compare(app, action);
+  qmpipe::register_convert(app, action);
+  qmpipe::register_diff(app, action);
   qmpipe::register_info(app, action);
   qmpipe::register_tin(app, action);
   qmpipe::register_synth(app, action);
