@@ -184,6 +184,24 @@ class ServeTest(unittest.TestCase):
         finally:
             self.assertEqual(server.end()[0], 0)
 
+    def test_check_finds_nothing_wrong_with_any_form_of_a_set(self):
+        forms = [self.packed, self.plain]
+        for form in ("mbtiles", "pmtiles"):
+            forms.append(self.root / f"checked.{form}")
+            subprocess.run([QMPIPE, "convert", self.packed, "-o", forms[-1]], check=True,
+                           capture_output=True)
+        for form in forms:
+            server = Server(form, "--port", "0")
+            try:
+                for address in (server.said["terrain"], server.said["viewer"]):
+                    done = subprocess.run([QMPIPE, "check", address, "--json", "--origin",
+                                           "http://elsewhere.example"], capture_output=True, text=True,
+                                          timeout=120, check=False)
+                    self.assertEqual(done.returncode, 0, (form, done.stdout, done.stderr))
+                    self.assertEqual(json.loads(done.stdout)["findings"], [], form)
+            finally:
+                self.assertEqual(server.end()[0], 0)
+
     def test_absent_things_are_404_in_json(self):
         for path in ("/tiles/9/0/0.terrain", "/tiles/0/7/0.terrain", "/tiles/-1/0/0.terrain",
                      "/tiles/00/0/0.terrain", "/tiles/0/0/0.terrain/", "/tiles/0/0.terrain",
