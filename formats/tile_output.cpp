@@ -17,7 +17,7 @@ namespace {
   throw UsageError(output.string() +
                    ": a PMTiles file is packed from a finished tile set, in an order that no build "
                    "keeps; build " +
-                   packed.string() + ", then: qmpipe convert " + packed.string() + " " +
+                   packed.string() + ", then: qmpipe convert " + packed.string() + " -o " +
                    output.string());
 }
 
