@@ -32,7 +32,7 @@ std::vector<std::string> violated_rules(const BuildOptions& options) {
           "-o, --output: name the folder or the .mbtiles file for the tiles");
   require(form_of(options.output.path) != TileForm::kPmtiles,
           fmt::format("-o, --output {}: no build keeps the order of tiles that a PMTiles file has; "
-                      "build an .mbtiles file, then: qmpipe convert OUT.mbtiles OUT.pmtiles",
+                      "build an .mbtiles file, then: qmpipe convert OUT.mbtiles -o OUT.pmtiles",
                       options.output.path.string()));
   require(mesh.min_zoom >= 0 && mesh.min_zoom <= kMaxZoom,
           fmt::format("--min-zoom must be 0..{}", kMaxZoom));

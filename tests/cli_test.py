@@ -352,9 +352,9 @@ class Cli(unittest.TestCase):
         self.assertFalse((out / "layer.json").exists())
 
     def test_pack_convert_and_unpack_give_the_same_set_back(self):
-        packed = self.root / "packed.mbtiles"
-        archive = self.root / "packed.pmtiles"
-        back = self.root / "unpacked"
+        packed = self.root / "turn.mbtiles"
+        archive = self.root / "turn.pmtiles"
+        back = self.root / "turn_back"
         for arguments in (("pack", self.tiles, "-o", packed),
                           ("convert", packed, "-o", archive),
                           ("unpack", archive, "-o", back)):
@@ -373,7 +373,7 @@ class Cli(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
             done = run("verify", form)
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-        plain = self.root / "plain.pmtiles"
+        plain = self.root / "turn_plain.pmtiles"
         done = run("pack", archive, "-o", plain, "--gzip", "none")
         self.assertEqual(done.returncode, 0, done.stderr)
         done = run("diff", archive, plain, "--json")

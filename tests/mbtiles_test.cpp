@@ -225,7 +225,7 @@ TEST(TileOutput, TheFormIsToldByTheNameAndPmtilesAreRefusedWithTheWay) {
     open_tile_sink("a/b.pmtiles", Overwrite::kNo);
     FAIL();
   } catch (const UsageError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("qmpipe convert a/b.mbtiles a/b.pmtiles"));
+    EXPECT_THAT(error.what(), HasSubstr("qmpipe convert a/b.mbtiles -o a/b.pmtiles"));
   }
 }
 
