@@ -136,6 +136,11 @@ for (const form of ['folder', 'plain', 'mbtiles', 'pmtiles']) {
   });
 }
 
+test('the reference reader of PMTiles sees the tiles of the folder', patience, () => {
+  const reader = fileURLToPath(new URL('pmtiles_reader_test.mjs', import.meta.url));
+  console.log(run(process.execPath, reader, sets.pmtiles, sets.folder).trim());
+});
+
 test('the switches change the picture, closer tiles are deeper, and the cursor has a height', patience,
      async () => {
   await withServer(sets.folder, async (address) => {
