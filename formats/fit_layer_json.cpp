@@ -69,19 +69,6 @@ Projection guess_projection(const std::vector<std::pair<TileKey, QuantizedMesh>>
   return mercator_off_deg < geodetic_off_deg ? Projection::kMercator : Projection::kGeodetic;
 }
 
-RectangleDeg bounds_of(const std::vector<TileKey>& keys, const TilingScheme& scheme) {
-  RectangleDeg box = {.west_deg = 180, .south_deg = 90, .east_deg = -180, .north_deg = -90};
-  for (const TileKey& key : keys) {
-    if (!scheme.contains(key)) continue;
-    const RectangleDeg tile = scheme.rectangle_deg(key);
-    box.west_deg = std::min(box.west_deg, tile.west_deg);
-    box.south_deg = std::min(box.south_deg, tile.south_deg);
-    box.east_deg = std::max(box.east_deg, tile.east_deg);
-    box.north_deg = std::max(box.north_deg, tile.north_deg);
-  }
-  return box;
-}
-
 class Fitter {
  public:
   Fitter(const TileSet& tile_set, const std::string& name)
@@ -115,8 +102,9 @@ class Fitter {
     LayerJson layer;
     layer.name = name;
     layer.projection = guess_projection(sample_);
-    if (!zooms_.empty()) {
-      layer.bounds_deg = bounds_of(zooms_.back(), TilingScheme(layer.projection));
+    const TilingScheme scheme(layer.projection);
+    if (!zooms_.empty() && scheme.contains(zooms_.back().back())) {
+      layer.bounds_deg = bounds_of_deepest(zooms_.back(), TilingScheme(layer.projection));
     }
     json_ = Json::parse(write_layer_json(layer));
     parsed_ = *parse_layer_json(json_.dump());

@@ -65,7 +65,10 @@ std::vector<std::uint8_t> gzip_compress(std::span<const std::uint8_t> plain, int
 }
 
 bool is_gzip(std::span<const std::uint8_t> bytes) {
-  return bytes.size() >= 2 && bytes[0] == 0x1F && bytes[1] == 0x8B;
+  // Two bytes alone would take one plain tile in 65,536 for gzip: a tile begins with a coordinate.
+  constexpr std::uint8_t kReservedFlags = 0xE0;
+  return bytes.size() >= 4 && bytes[0] == 0x1F && bytes[1] == 0x8B && bytes[2] == 8 &&
+         (bytes[3] & kReservedFlags) == 0;
 }
 
 Result<std::vector<std::uint8_t>> gzip_decompress(std::span<const std::uint8_t> packed,

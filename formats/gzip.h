@@ -33,6 +33,8 @@ class GzipCompressor {
 // For a single call; sets up a compressor and throws it away.
 std::vector<std::uint8_t> gzip_compress(std::span<const std::uint8_t> plain, int level);
 
+// By the first four bytes (RFC 1952: two fixed ones, the method 8, flags without reserved bits). One
+// plain tile in 134 million looks so too.
 bool is_gzip(std::span<const std::uint8_t> bytes);
 
 // Accepts exactly one member. Refuses damaged data, anything after the member, and what would grow

@@ -51,6 +51,10 @@ struct LayerJson {
 // REQUIRES: keys sorted, all of one zoom, no key twice.
 std::vector<TileRange> merge_ranges(std::span<const TileKey> keys);
 
+// The rectangle around the tiles of the deepest zoom. REQUIRES: keys sorted, of the scheme, not
+// empty.
+RectangleDeg bounds_of_deepest(std::span<const TileKey> keys, const TilingScheme& scheme);
+
 // REQUIRES: finite bounds; qmpipe_json empty or a JSON object.
 std::string write_layer_json(const LayerJson& layer);
 

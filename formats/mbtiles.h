@@ -7,6 +7,7 @@
 // and layer.json, whole, under that name.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 
@@ -15,17 +16,31 @@
 
 namespace qmpipe {
 
+// SQLite's page cache and statements.
+inline constexpr std::int64_t kMbtilesSinkBytes = std::int64_t{10} << 20U;
+// The hash by which an equal tile is found again.
+inline constexpr std::int64_t kMbtilesSinkBytesPerTile = 48;
+
 // Tiles go to PATH.qmpipe-tmp, which takes the file's name in close(): a file that has its name is
 // whole. Throws IoError when it cannot be written, or when `path` exists and `overwrite` is kNo;
 // with kYes the older file stays until close().
 //
 // Guarantees: what sync() returned from outlives a kill and a power cut. The same tiles in the same
 // order make the same bytes, however often the run was interrupted and wherever sync() was called
-// (for one version of SQLite). A tile that is there with the same bytes is not written again.
+// (for one version of SQLite); after a tile was replaced by another, the same tiles, but maybe not the
+// same bytes. A tile that is there with the same bytes is not written again. One process at a time has
+// a working file; sync() and close() notice when it was removed or replaced. What was written since
+// the last sync() is gone when the sink is destroyed without close(), and a working file without
+// tiles with it. After an error nothing works.
+//
+// Memory: kMbtilesSinkBytes, and kMbtilesSinkBytesPerTile for each tile that equals no other.
 std::unique_ptr<TileSink> open_mbtiles_sink(const std::filesystem::path& path, Overwrite overwrite);
 
 // Goes on with PATH.qmpipe-tmp, or starts it when it is gone; an older file at `path` stays until
-// close(). Throws IoError when it is not ours or damaged.
+// close(). Where there is no working file, the file at `path` may be what a run finished before it
+// was killed: its tiles are taken for there, and close() asks for the same layer.json. A write()
+// starts a working file after all, or throws IoError when has() has just said yes. Throws IoError
+// when the working file is not ours or damaged.
 std::unique_ptr<TileSink> resume_mbtiles_sink(const std::filesystem::path& path);
 
 // How a file numbers its rows; ours and the specification's is kTms.

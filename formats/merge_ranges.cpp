@@ -88,4 +88,17 @@ std::vector<TileRange> merge_ranges(std::span<const TileKey> keys) {
   return by_columns.size() < by_rows.size() ? by_columns : by_rows;
 }
 
+RectangleDeg bounds_of_deepest(std::span<const TileKey> keys, const TilingScheme& scheme) {
+  QMPIPE_CHECK(!keys.empty());
+  RectangleDeg box = scheme.rectangle_deg(keys.back());
+  for (auto key = keys.rbegin(); key != keys.rend() && key->zoom == keys.back().zoom; ++key) {
+    const RectangleDeg tile = scheme.rectangle_deg(*key);
+    box.west_deg = std::min(box.west_deg, tile.west_deg);
+    box.south_deg = std::min(box.south_deg, tile.south_deg);
+    box.east_deg = std::max(box.east_deg, tile.east_deg);
+    box.north_deg = std::max(box.north_deg, tile.north_deg);
+  }
+  return box;
+}
+
 }  // namespace qmpipe

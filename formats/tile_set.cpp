@@ -4,18 +4,25 @@
 
 #include <algorithm>
 #include <cctype>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/gzip.h"
+#include "formats/mbtiles.h"
+#include "formats/pmtiles.h"
+#include "formats/quantized_mesh.h"
+#include "formats/tile_output.h"
 #include "formats/tile_path.h"
 
 namespace qmpipe {
 namespace {
 
 namespace fs = std::filesystem;
+
+const char* const kRemedy = "Name the folder that holds layer.json, or the file of a packed set.";
 
 bool is_all_digits(const std::string& text) {
   return !text.empty() && std::all_of(text.begin(), text.end(),
@@ -134,32 +141,68 @@ class FolderTileSet final : public TileSet {
   std::vector<std::string> strays_;
 };
 
-}  // namespace
+bool starts_with(const fs::path& path, std::string_view start) {
+  const auto bytes = read_file_range(path, 0, start.size());
+  return bytes && std::equal(start.begin(), start.end(), bytes->begin());
+}
 
-std::unique_ptr<TileSet> open_tile_set(const fs::path& path) {
+// By its name, else by its first bytes.
+TileForm form_of_file(const fs::path& path) {
+  const TileForm by_name = form_of(path);
+  if (by_name != TileForm::kFolder) return by_name;
+  if (starts_with(path, std::string_view("SQLite format 3\0", 16))) return TileForm::kMbtiles;
+  if (starts_with(path, "PMTiles")) return TileForm::kPmtiles;
+  return TileForm::kFolder;
+}
+
+std::unique_ptr<TileSet> open_file_set(const fs::path& path) {
+  switch (form_of_file(path)) {
+    case TileForm::kMbtiles:
+      return open_mbtiles_set(path);
+    case TileForm::kPmtiles:
+      return open_pmtiles_set(path);
+    case TileForm::kFolder:
+      break;
+  }
+  throw IoError("cannot open the tile set", path.string(),
+                "it is neither a folder nor an .mbtiles or .pmtiles file", kRemedy);
+}
+
+std::unique_ptr<TileSet> open_folder_set(const fs::path& folder) {
   std::error_code code;
-  const bool is_layer_json = path.filename() == "layer.json" && fs::is_regular_file(path, code);
-  fs::path folder = is_layer_json ? path.parent_path() : path;
-  if (folder.empty()) folder = ".";
-  if (!fs::exists(folder, code)) {
-    throw IoError("cannot open the tile set", path.string(),
-                  code ? code.message() : "there is no such folder", "Check the path.");
-  }
-  if (!fs::is_directory(folder, code)) {
-    throw IoError("cannot open the tile set", path.string(), "it is no folder",
-                  "Name the folder that holds layer.json.");
-  }
   auto tile_set = std::make_unique<FolderTileSet>(folder);
   if (tile_set->keys().empty() && !fs::exists(folder / "layer.json", code)) {
-    throw IoError("cannot open the tile set", path.string(),
-                  "there is neither a layer.json nor a tile in it",
-                  "Name the folder that holds layer.json.");
+    throw IoError("cannot open the tile set", folder.string(),
+                  "there is neither a layer.json nor a tile in it", kRemedy);
   }
   return tile_set;
 }
 
+}  // namespace
+
+bool is_tile_set(const fs::path& path) {
+  std::error_code code;
+  return fs::is_directory(path, code) || path.filename() == "layer.json" ||
+         form_of_file(path) != TileForm::kFolder;
+}
+
+std::unique_ptr<TileSet> open_tile_set(const fs::path& path) {
+  std::error_code code;
+  if (!fs::exists(path, code)) {
+    throw IoError("cannot open the tile set", path.string(),
+                  code ? code.message() : "there is no such file or folder", "Check the path.");
+  }
+  if (fs::is_directory(path, code)) return open_folder_set(path);
+  if (path.filename() != "layer.json") return open_file_set(path);
+  return open_folder_set(path.has_parent_path() ? path.parent_path() : ".");
+}
+
 Result<std::vector<std::uint8_t>> plain_tile_bytes(std::vector<std::uint8_t> stored) {
-  if (is_gzip(stored)) return gzip_decompress(stored, kLargestTileBytes);
+  if (is_gzip(stored)) {
+    auto plain = gzip_decompress(stored, kLargestTileBytes);
+    // A tile begins with a coordinate, whose bytes may look like gzip's.
+    if (plain || !decode(stored)) return plain;
+  }
   if (stored.size() > kLargestTileBytes) {
     return Error{fmt::format("the tile has {} bytes, more than the {} allowed", stored.size(),
                              kLargestTileBytes)};

@@ -32,10 +32,15 @@ class TileSet {
   virtual Result<std::int64_t> stored_bytes(const TileKey& key) const = 0;
 };
 
-// `path`: the set's folder, or the layer.json in it. Throws IoError when it cannot be opened as a
-// tile set: not there, no folder, neither a layer.json nor a tile in it, or a folder of it that
-// cannot be listed.
+// `path`: the set's folder, the layer.json in it, or a file that holds the set (told by its
+// extension, else by its first bytes). Throws IoError when it cannot be opened as a tile set: not
+// there, no such file, neither a layer.json nor a tile in the folder, or a folder of it that cannot
+// be listed.
 std::unique_ptr<TileSet> open_tile_set(const std::filesystem::path& path);
+
+// A folder, a layer.json or a file that holds a set, to be told from a single tile's file. Looks no
+// further than open_tile_set() does before it decides.
+bool is_tile_set(const std::filesystem::path& path);
 
 // A tile's bytes without gzip, where there was any; refuses what would exceed 256 MiB.
 Result<std::vector<std::uint8_t>> plain_tile_bytes(std::vector<std::uint8_t> stored);

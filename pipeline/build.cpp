@@ -10,8 +10,8 @@
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
-#include "formats/folder_sink.h"
 #include "formats/layer_json.h"
+#include "formats/tile_output.h"
 #include "pipeline/build_plan.h"
 #include "pipeline/fingerprint.h"
 #include "pipeline/memory_share.h"
@@ -91,11 +91,17 @@ RectangleDeg united_bounds(const std::vector<RasterInfo>& sources) {
   return box;
 }
 
+// A folder's name may hold dots, a file's extension is no part of it.
+std::string name_of(const std::filesystem::path& output) {
+  const std::filesystem::path plain = plain_path(output);
+  const bool is_folder = form_of(output) == TileForm::kFolder;
+  return (is_folder ? plain.filename() : plain.stem()).string();
+}
+
 LayerJson layer_for(const BuildOptions& options, const Survey& survey, const BuildPlan& plan,
                     const BuildReport& report) {
   LayerJson layer;
-  layer.name = options.output.name.empty() ? plain_path(options.output.path).filename().string()
-                                           : options.output.name;
+  layer.name = options.output.name.empty() ? name_of(options.output.path) : options.output.name;
   layer.description = options.output.description;
   layer.attribution = options.output.attribution;
   // Clients cache by version, so it changes when, and only when, a tile does.
@@ -142,18 +148,19 @@ RunPlace open_place(const BuildOptions& options, Progress& progress) {
   return place;
 }
 
-// Opened before hours of work, so that a folder that cannot be used is known at once.
+// Opened before hours of work, so that an output that cannot be used is known at once.
 std::unique_ptr<TileSink> open_sink(const BuildOptions& options, const RunPlace& place) {
   if (options.run.dry_run) return nullptr;
   if (place.record != nullptr && place.record->resumes()) {
-    return resume_folder_sink(options.output.path);
+    return resume_tile_sink(options.output.path);
   }
-  return open_folder_sink(options.output.path, options.output.overwrite);
+  return open_tile_sink(options.output.path, options.output.overwrite);
 }
 
 MemoryRequest memory_request(const BuildOptions& options) {
   return {.limit_bytes = options.run.memory_bytes,
-          .simplify_bytes = simplify_bytes(options.mesh.method)};
+          .simplify_bytes = simplify_bytes(options.mesh.method),
+          .output = form_of(options.output.path)};
 }
 
 // A zoom that an earlier run has on disk stays there, however much memory there is now.
@@ -179,17 +186,23 @@ void place_store(SurveyOptions& survey, const MemoryShare& share, const BuildOpt
       share.last_memory_zoom, survey.store_folder.string(), bytes_text(share.store_bytes)));
 }
 
+// The folder that is there once the sink is open, on the disk that the tiles go to.
+std::filesystem::path folder_of(const std::filesystem::path& output) {
+  return form_of(output) == TileForm::kFolder ? output : plain_path(output).parent_path();
+}
+
 void note_estimate(const BuildOptions& options, const Estimate& estimate, Progress& progress) {
+  const std::filesystem::path& output = options.output.path;
   progress.note(fmt::format("{} tiles, about {} and {:.0f} s, memory at most {}", estimate.tiles,
                             bytes_text(estimate.bytes), std::max(1.0, estimate.seconds),
                             bytes_text(estimate.expected_peak_bytes)));
   std::error_code code;
-  const std::filesystem::space_info disk = std::filesystem::space(options.output.path, code);
+  const std::filesystem::space_info disk = std::filesystem::space(folder_of(output), code);
   if (!code && std::cmp_less(disk.available, estimate.bytes)) {
-    progress.note(fmt::format(
-        "the disk of {} has {} free, too little: the run will stop when it is "
-        "full, and can go on when there is more",
-        options.output.path.string(), bytes_text(static_cast<std::int64_t>(disk.available))));
+    progress.note(
+        fmt::format("the disk of {} has {} free, too little: the run will stop when it is "
+                    "full, and can go on when there is more",
+                    output.string(), bytes_text(static_cast<std::int64_t>(disk.available))));
   }
 }
 
@@ -223,7 +236,7 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
   result.report.survey_s = survey.seconds;
   result.report.peak_resident_bytes = peak_resident_bytes();
   const std::string text = write_report(result.report);
-  write_file_atomically(options.output.path / "report.json",
+  write_file_atomically(report_path(options.output.path),
                         {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   sink->close(write_layer_json(layer_for(options, survey, plan, result.report)));
   return result;

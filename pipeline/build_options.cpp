@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "formats/tile_output.h"
+
 namespace qmpipe {
 namespace {
 
@@ -27,7 +29,11 @@ std::vector<std::string> violated_rules(const BuildOptions& options) {
   const MeshOptions& mesh = options.mesh;
   require(!options.input.paths.empty(), "INPUT: name at least one raster");
   require(options.run.dry_run || !options.output.path.empty(),
-          "-o, --output: name the folder for the tiles");
+          "-o, --output: name the folder or the .mbtiles file for the tiles");
+  require(form_of(options.output.path) != TileForm::kPmtiles,
+          fmt::format("-o, --output {}: no build keeps the order of tiles that a PMTiles file has; "
+                      "build an .mbtiles file, then: qmpipe convert OUT.mbtiles -o OUT.pmtiles",
+                      options.output.path.string()));
   require(mesh.min_zoom >= 0 && mesh.min_zoom <= kMaxZoom,
           fmt::format("--min-zoom must be 0..{}", kMaxZoom));
   require(!mesh.max_zoom || (*mesh.max_zoom >= 0 && *mesh.max_zoom <= kMaxZoom),

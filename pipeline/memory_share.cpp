@@ -7,6 +7,7 @@
 
 #include "formats/errors.h"
 #include "formats/hdf5_lattice_store.h"
+#include "formats/mbtiles.h"
 #include "pipeline/block_cover.h"
 #include "pipeline/process_memory.h"
 #include "pipeline/sampling_order.h"
@@ -108,6 +109,9 @@ MemoryShare share_memory(const MemoryRequest& request, const SurveyOptions& surv
   for (std::int32_t zoom = 0; zoom <= sampling_zoom; ++zoom) {
     blocks.push_back(expected_blocks(survey.scheme, zoom, sources));
     needs.tiles += blocks.back();
+  }
+  if (request.output == TileForm::kMbtiles) {
+    needs.output_bytes = kMbtilesSinkBytes + needs.tiles * kMbtilesSinkBytesPerTile;
   }
 
   std::vector<Division> divisions;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "formats/tile_output.h"
 #include "pipeline/survey.h"
 #include "scheduler/memory_budget.h"
 
@@ -26,6 +27,7 @@ struct MemoryRequest {
   std::int64_t simplify_bytes = 0;
   // Deeper zooms go to disk even when they would fit.
   std::int32_t deepest_memory_zoom = kMaxZoom;
+  TileForm output = TileForm::kFolder;
 };
 
 // As many zooms as fit half the limit and leave the source its cache stay in memory, coarse ones

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/text_table.h"
 #include "pipeline/verify.h"
 
 namespace qmpipe {
@@ -13,39 +14,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// 1234567 as "1,234,567".
-std::string grouped(std::int64_t number) {
-  std::string digits = std::to_string(number);
-  for (auto at = static_cast<std::ptrdiff_t>(digits.size()) - 3; at > 0; at -= 3) {
-    digits.insert(static_cast<std::size_t>(at), 1, ',');
-  }
-  return digits;
-}
-
-std::string counted(std::int64_t number, const char* noun) {
-  return grouped(number) + " " + noun + (number == 1 ? "" : "s");
-}
-
-using Row = std::vector<std::string>;
-
-// Columns aligned to the right, two blanks apart.
-std::string table_text(const std::vector<Row>& rows) {
-  std::vector<std::size_t> widths(rows.front().size(), 0);
-  for (const Row& row : rows) {
-    for (std::size_t k = 0; k < row.size(); ++k) widths[k] = std::max(widths[k], row[k].size());
-  }
-  std::string text;
-  for (const Row& row : rows) {
-    for (std::size_t k = 0; k < row.size(); ++k) {
-      text += fmt::format("{}{:>{}}", k == 0 ? "" : "  ", row[k], widths[k]);
-    }
-    text += "\n";
-  }
-  return text;
-}
-
-Row heading(const VerifyReport& report) {
-  Row row = {"zoom", "tiles", "V", "T", "bytes", "bytes/tile", "crack mm"};
+TableRow heading(const VerifyReport& report) {
+  TableRow row = {"zoom", "tiles", "V", "T", "bytes", "bytes/tile", "crack mm"};
   if (report.has_source) {
     for (const char* name : {"max err m", "mean err m", "RMS err m", "tolerance m"}) {
       row.emplace_back(name);
@@ -59,14 +29,14 @@ Row heading(const VerifyReport& report) {
   return row;
 }
 
-Row row_of(const VerifyReport& report, const ZoomReport& zoom) {
-  Row row = {std::to_string(zoom.zoom),
-             grouped(zoom.tiles),
-             fmt::format("{:.1f}", zoom.mean_vertices()),
-             fmt::format("{:.1f}", zoom.mean_triangles()),
-             grouped(zoom.stored_bytes),
-             grouped(zoom.stored_bytes / zoom.tiles),
-             zoom.borders == 0 ? "-" : fmt::format("{:.3f}", zoom.largest_crack_m * 1000)};
+TableRow row_of(const VerifyReport& report, const ZoomReport& zoom) {
+  TableRow row = {std::to_string(zoom.zoom),
+                  grouped(zoom.tiles),
+                  fmt::format("{:.1f}", zoom.mean_vertices()),
+                  fmt::format("{:.1f}", zoom.mean_triangles()),
+                  grouped(zoom.stored_bytes),
+                  grouped(zoom.stored_bytes / zoom.tiles),
+                  zoom.borders == 0 ? "-" : fmt::format("{:.3f}", zoom.largest_crack_m * 1000)};
   if (report.has_source) {
     if (zoom.error.posts == 0) {
       row.insert(row.end(), 3, "-");
@@ -146,7 +116,7 @@ Json json_of_findings(const std::vector<Finding>& findings) {
 }  // namespace
 
 std::string text_of(const VerifyReport& report) {
-  std::vector<Row> rows = {heading(report)};
+  std::vector<TableRow> rows = {heading(report)};
   for (const ZoomReport& zoom : report.zooms) rows.push_back(row_of(report, zoom));
   std::string text = table_text(rows);
   text += findings_text(report, report.warnings, "warning");

@@ -33,8 +33,8 @@ std::int64_t tiles_within(const MemoryNeeds& needs, std::int64_t room_bytes) {
 
 MemoryPlan plan_memory(std::int64_t limit_bytes, const MemoryNeeds& needs) {
   QMPIPE_CHECK(needs.threads >= 1 && limit_bytes >= 0);
-  const std::int64_t fixed =
-      kProgramBytes + kGdalCacheBytes + needs.lattice_bytes + needs.tiles * kPlanBytesPerTile;
+  const std::int64_t fixed = kProgramBytes + kGdalCacheBytes + needs.lattice_bytes +
+                             needs.tiles * kPlanBytesPerTile + needs.output_bytes;
   const std::int64_t smallest_cache = kSmallestCacheBytes + needs.source_block_bytes;
   // The cache's bound does not hold for the block that a thread has in hand.
   const std::int64_t bytes_per_sampler =

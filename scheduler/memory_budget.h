@@ -23,6 +23,8 @@ struct MemoryNeeds {
   std::int64_t simplify_bytes = 0;
   // Per tile of the plan, for its keys, ranges and statistics.
   std::int64_t tiles = 0;
+  // What the output holds, however many tiles are in flight.
+  std::int64_t output_bytes = 0;
 };
 
 struct MemoryPlan {

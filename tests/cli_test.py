@@ -3,11 +3,13 @@
 
 usage: cli_test.py QMPIPE
 """
+import contextlib
 import json
 import os
 import pathlib
 import re
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -49,11 +51,13 @@ class Cli(unittest.TestCase):
     def test_help_names_every_command(self):
         done = run("--help")
         self.assertEqual(done.returncode, 0)
-        for command in ("build", "verify", "compare", "info", "tin", "synth"):
+        for command in ("build", "verify", "serve", "check", "compare", "info", "tin", "synth",
+                        "convert", "pack", "unpack", "diff"):
             self.assertIn(command, done.stdout)
 
     def test_each_command_has_help_with_an_example(self):
-        for command in ("build", "verify", "compare", "info", "tin", "synth"):
+        for command in ("build", "verify", "serve", "check", "compare", "info", "tin", "synth",
+                        "convert", "pack", "unpack", "diff"):
             done = run(command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn("qmpipe " + command, done.stdout)
@@ -97,6 +101,73 @@ class Cli(unittest.TestCase):
             done = run("info", tile, "--mesh", self.root / name)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertGreater((self.root / name).stat().st_size, 500)
+
+    def test_mbtiles_hold_what_the_folder_holds(self):
+        packed = self.root / "packed.mbtiles"
+        done = run("build", self.dem, "-o", packed, "--name", "tiles")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        files = sorted(self.tiles.glob("*/*/*.terrain"))
+        with contextlib.closing(sqlite3.connect(packed)) as database:
+            self.assertEqual(database.execute("PRAGMA integrity_check").fetchone(), ("ok",))
+            rows = database.execute("SELECT zoom_level, tile_column, tile_row, tile_data FROM tiles")
+            found = {"/".join(map(str, row[:3])): row[3] for row in rows}
+            layer, = database.execute(
+                "SELECT value FROM metadata WHERE name = 'layer.json'").fetchone()
+        expected = {"/".join(path.with_suffix("").parts[-3:]): path.read_bytes() for path in files}
+        self.assertEqual(found, expected)
+        self.assertEqual(layer, (self.tiles / "layer.json").read_text())
+        self.assertEqual(json.loads((self.root / "packed.mbtiles.report.json").read_text())["tiles"],
+                         len(files))
+        counted = subprocess.run(["sqlite3", packed, "SELECT count(*) FROM tiles"],
+                                 capture_output=True, text=True, check=True).stdout
+        self.assertEqual(int(counted), len(files))
+        done = run("verify", packed, "--source", self.dem)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("0 faults", done.stdout)
+
+    def test_info_of_mbtiles_and_of_a_tile_in_a_set(self):
+        packed = self.root / "info.mbtiles"
+        run("build", self.dem, "-o", packed)
+        as_file = json.loads(run("info", packed, "--json").stdout)
+        as_folder = json.loads(run("info", self.tiles, "--json").stdout)
+        self.assertEqual(as_file["zooms"], as_folder["zooms"])
+        self.assertEqual(as_file["complaints"], [])
+        self.assertEqual(as_file["layer"]["name"], "info")
+        tile = max(self.tiles.glob("*/*/*.terrain"), key=lambda p: p.stat().st_size)
+        key = "/".join(tile.with_suffix("").parts[-3:])
+        expected = json.loads(run("info", tile, "--json").stdout)
+        for place in (packed, self.tiles):
+            found = json.loads(run("info", place, "--key", key, "--json").stdout)
+            self.assertEqual(found.pop("key"), key)
+            self.assertEqual({**found, "path": ""}, {**expected, "path": ""})
+        self.assertIn(f"info.mbtiles: tile {key}", run("info", packed, "--key", key).stdout)
+        meshes = []
+        for number, place in enumerate(([tile], [packed, "--key", key], [self.tiles, "--key", key])):
+            mesh = self.root / f"in-set-{number}.ply"
+            done = run("info", *place, "--mesh", mesh)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            meshes.append(mesh.read_bytes())
+        self.assertEqual(meshes, [meshes[0]] * 3)
+        self.fails(1, "info", packed, "--key", "9/0/0", says=["there is no tile 9/0/0"])
+        self.fails(2, "info", packed, "--mesh", self.root / "x.ply", says=["--key"])
+        self.fails(2, "info", tile, "--key", key, says=["--key"])
+        self.fails(2, "info", packed, "--key", "9/0", says=["zoom/x/y"])
+
+    def test_pmtiles_are_no_output_of_a_build(self):
+        out = self.root / "out.pmtiles"
+        self.fails(2, "build", self.dem, "-o", out, says=["qmpipe convert"])
+        self.assertFalse(out.exists())
+
+    def test_what_is_no_mbtiles_file_is_refused(self):
+        fake = self.root / "fake.mbtiles"
+        fake.write_text("no database")
+        for command in ("info", "verify"):
+            self.fails(1, command, fake, says=["fake.mbtiles", "no SQLite file"])
+        # The name does not matter where the first bytes tell.
+        run("build", self.dem, "-o", self.root / "real.mbtiles")
+        renamed = self.root / "real.bin"
+        (self.root / "real.mbtiles").rename(renamed)
+        self.assertEqual(run("verify", renamed).returncode, 0)
 
     def test_tin_writes_one_mesh_and_its_errors(self):
         for name in ("tin.ply", "tin.obj", "tin.glb", "tin.stl"):
@@ -171,6 +242,13 @@ class Cli(unittest.TestCase):
 
     def test_existing_output_is_refused_with_the_remedy(self):
         self.fails(1, "build", self.dem, "-o", self.tiles, says=["--overwrite"])
+        file = self.root / "there.mbtiles"
+        file.write_text("mine")
+        self.fails(1, "build", self.dem, "-o", file, says=["--overwrite"])
+        self.assertEqual(file.read_text(), "mine")
+        self.assertEqual(sorted(p.name for p in self.root.glob("there.*")), [file.name])
+        self.assertEqual(run("build", self.dem, "-o", file, "--overwrite").returncode, 0)
+        self.assertEqual(run("verify", file).returncode, 0)
 
     def test_overwrite_leaves_other_files_alone(self):
         out = self.root / "shared-folder"
@@ -272,6 +350,95 @@ class Cli(unittest.TestCase):
         self.assertEqual(process.returncode, 130, stderr)
         self.assertRegex(stderr, r"stopped after \d+ of \d+ tiles")
         self.assertFalse((out / "layer.json").exists())
+
+    def test_pack_convert_and_unpack_give_the_same_set_back(self):
+        packed = self.root / "turn.mbtiles"
+        archive = self.root / "turn.pmtiles"
+        back = self.root / "turn_back"
+        for arguments in (("pack", self.tiles, "-o", packed),
+                          ("convert", packed, "-o", archive),
+                          ("unpack", archive, "-o", back)):
+            done = run(*arguments, "--json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            report = json.loads(done.stdout)
+            self.assertEqual(report["tiles"], len(list(self.tiles.glob("*/*/*.terrain"))))
+            self.assertEqual((report["repacked_tiles"], report["notes"]), (0, []))
+        names = sorted(p.relative_to(back) for p in back.rglob("*") if p.is_file())
+        self.assertEqual(names, sorted(p.relative_to(self.tiles) for p in self.tiles.rglob("*")
+                                       if p.is_file() and p.name != "report.json"))
+        for name in names:
+            self.assertEqual((back / name).read_bytes(), (self.tiles / name).read_bytes())
+        for form in (packed, archive, back):
+            done = run("diff", self.tiles, form)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            done = run("verify", form)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        plain = self.root / "turn_plain.pmtiles"
+        done = run("pack", archive, "-o", plain, "--gzip", "none")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("diff", archive, plain, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(done.stdout)
+        self.assertTrue(report["same"])
+        self.assertEqual(report["total"]["same_unpacked"], report["total"]["tiles_a"])
+
+    def test_rows_from_the_north_are_turned(self):
+        packed = self.root / "south.mbtiles"
+        done = run("pack", self.tiles, "-o", packed)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        flipped = self.root / "north.mbtiles"
+        with contextlib.closing(sqlite3.connect(packed)) as tms, \
+                contextlib.closing(sqlite3.connect(flipped)) as xyz, xyz:
+            xyz.execute("CREATE TABLE metadata (name TEXT, value TEXT)")
+            xyz.execute("CREATE TABLE tiles (zoom_level INTEGER, tile_column INTEGER,"
+                        " tile_row INTEGER, tile_data BLOB)")
+            xyz.executemany("INSERT INTO metadata VALUES (?, ?)",
+                            tms.execute("SELECT name, value FROM metadata"))
+            xyz.executemany("INSERT INTO tiles VALUES (?, ?, ?, ?)",
+                            tms.execute("SELECT zoom_level, tile_column,"
+                                        " (1 << zoom_level) - 1 - tile_row, tile_data FROM tiles"))
+        out = self.root / "turned"
+        done = run("convert", flipped, "-o", out, "--rows", "xyz")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("diff", self.tiles, out)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_diff_tells_what_differs(self):
+        coarse = self.root / "coarse"
+        done = run("build", self.dem, "-o", coarse, "--tolerance", "60000")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = run("diff", self.tiles, coarse, "--max", 2)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("layer.json qmpipe.", done.stdout)
+        self.assertRegex(done.stdout, r"(?m)^different \d+/\d+/\d+: \d+ / \d+ vertices")
+        self.assertRegex(done.stdout, r"(?m)^\d+ more different not shown$")
+        self.assertEqual(run("diff", self.tiles, coarse, "--max", 2, "--threads", 1).stdout,
+                         done.stdout)
+        self.fails(1, "diff", self.tiles, self.root / "nowhere", says=["nowhere"])
+        self.fails(2, "diff", self.tiles)
+
+    def test_convert_refuses_with_the_remedy(self):
+        self.fails(2, "pack", self.tiles, "-o", self.root / "folder", says=[".mbtiles or .pmtiles"])
+        self.fails(2, "unpack", self.tiles, "-o", self.root / "x.mbtiles", says=["convert"])
+        self.fails(2, "convert", self.tiles, "-o", self.tiles, "--overwrite",
+                   says=["the output is the input"])
+        self.fails(2, "convert", self.tiles / "layer.json", "-o", str(self.tiles) + "/",
+                   "--overwrite", says=["the output is the input"])
+        self.fails(2, "convert", self.tiles, "-o", self.root / "x.pmtiles", "--gzip", "13",
+                   says=["--gzip 13"])
+        self.fails(2, "convert", self.tiles, "-o", self.root / "x.pmtiles", "--rows", "xyz",
+                   says=["--rows"])
+        self.fails(2, "convert", self.tiles, "-o", self.root / "x.pmtiles", "--rows", "up")
+        self.fails(2, "convert", self.tiles)
+        self.fails(1, "convert", self.root / "nothing", "-o", self.root / "x.pmtiles",
+                   says=["nothing"])
+        taken = self.root / "taken.pmtiles"
+        taken.write_text("mine")
+        self.fails(1, "pack", self.tiles, "-o", taken, says=["--overwrite"])
+        self.assertEqual(taken.read_text(), "mine")
+        self.fails(1, "convert", taken, "-o", self.root / "x", says=["taken.pmtiles"])
+        self.assertFalse((self.root / "x").exists())
+        self.assertFalse((self.root / "x.pmtiles").exists())
 
     def test_verify_of_nothing_is_an_error(self):
         self.fails(1, "verify", self.root / "nothing-here", says=["nothing-here"])

@@ -86,7 +86,8 @@ TEST(FolderSink, AFolderThatIsTakenAwayIsNoticed) {
   EXPECT_THAT(io_error_of([&] { sink->write({.zoom = 1, .x = 1, .y = 0}, Bytes{1}); }),
               HasSubstr("removed or replaced"));
   EXPECT_THAT(io_error_of([&] { sink->sync(); }), HasSubstr("removed or replaced"));
-  EXPECT_THAT(io_error_of([&] { sink->close(write_layer_json(LayerJson())); }), HasSubstr("removed or replaced"));
+  EXPECT_THAT(io_error_of([&] { sink->close(write_layer_json(LayerJson())); }),
+              HasSubstr("removed or replaced"));
   EXPECT_TRUE(std::filesystem::is_empty(out));
 }
 

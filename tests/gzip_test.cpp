@@ -87,6 +87,10 @@ TEST(Gzip, TheLimitHoldsWhateverTheTrailerSays) {
 TEST(Gzip, WhatIsNoGzipIsToldApart) {
   EXPECT_FALSE(is_gzip({}));
   EXPECT_FALSE(is_gzip(Bytes{0x1F}));
+  EXPECT_TRUE(is_gzip(Bytes{0x1F, 0x8B, 8, 0x1F}));
+  // The start of a tile of real terrain, uncompressed: the lowest bytes of its centre's x.
+  EXPECT_FALSE(is_gzip(Bytes{0x1F, 0x8B, 0xFD, 0x58}));
+  EXPECT_FALSE(is_gzip(Bytes{0x1F, 0x8B, 8, 0x20}));
   EXPECT_EQ(gzip_decompress(Bytes(40), kPlenty).error().message, "the data is not gzip");
   EXPECT_TRUE(gzip_decompress(gzip_compress({}, 6), kPlenty)->empty());
 }

@@ -36,6 +36,7 @@ THIRD_PARTY = [
     ("CGAL", r"(CGAL|boost)/", ["stages"]),
     ("CLI11", r"CLI/", ["tools"]),
     ("cpp-httplib", r"httplib", ["tools"]),
+    ("libcurl", r"curl/", ["tools"]),
     ("spdlog/fmt", r"(spdlog|fmt)/", LAYERS),
     ("GoogleTest", r"(gtest|gmock)/", []),
     ("Google Benchmark", r"benchmark/", []),

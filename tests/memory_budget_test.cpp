@@ -20,7 +20,8 @@ MemoryNeeds random_needs(std::mt19937_64& random) {
           .source_front_bytes = below(kGiB),
           .source_handle_bytes = below(kMiB),
           .simplify_bytes = below(2) == 0 ? below(60 * kMiB) : 0,
-          .tiles = below(1'000'000)};
+          .tiles = below(1'000'000),
+          .output_bytes = below(2) == 0 ? below(100 * kMiB) : 0};
 }
 
 TEST(MemoryBudget, WhatFitsStaysBelowItsLimit) {

@@ -80,8 +80,10 @@ TEST(TileSet, WhatIsNoTileSetIsRefusedWithARemedy) {
     return "opened";
   };
   EXPECT_THAT(message(folder.path()), HasSubstr("neither a layer.json nor a tile"));
-  EXPECT_THAT(message(folder.path() / "none"), HasSubstr("no such folder\n  Check the path"));
-  EXPECT_THAT(message(folder.path() / "file"), HasSubstr("it is no folder"));
+  EXPECT_THAT(message(folder.path() / "none"),
+              HasSubstr("no such file or folder\n  Check the path"));
+  EXPECT_THAT(message(folder.path() / "file"),
+              HasSubstr("neither a folder nor an .mbtiles or .pmtiles file\n  Name the folder"));
   folder.put("layer.json", "{}");
   EXPECT_EQ(message(folder.path()), "opened");
 }

@@ -9,8 +9,8 @@
 
 #include "formats/file_bytes.h"
 #include "formats/folder_sink.h"
-#include "formats/layer_json.h"
 #include "formats/gzip.h"
+#include "formats/layer_json.h"
 #include "formats/tile_path.h"
 #include "stages/greedy.h"
 #include "stages/mesh_order.h"

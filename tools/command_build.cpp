@@ -105,7 +105,8 @@ int run_build(const BuildArguments& arguments) {
 
 void add_output_options(CLI::App& command, BuildArguments& arguments) {
   OutputOptions& output = arguments.output;
-  command.add_option("-o,--output", output.path, "Folder for the tiles")->type_name("OUT");
+  command.add_option("-o,--output", output.path, "Folder for the tiles, or OUT.mbtiles: one file")
+      ->type_name("OUT");
   command.add_flag("--overwrite", arguments.overwrite,
                    "Replace an earlier tile set in OUT; start an unfinished one over");
   command
@@ -143,13 +144,14 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
 void register_build(CLI::App& app, std::function<int()>& action) {
   auto arguments = std::make_shared<BuildArguments>();
   CLI::App* command = app.add_subcommand(
-      "build", "Turn rasters into a quantized-mesh terrain pyramid (folder with layer.json)");
+      "build", "Turn rasters into a quantized-mesh terrain pyramid (folder or .mbtiles file)");
   add_pyramid_options(*command, arguments->pyramid);
   add_method_options(*command, arguments->method);
   add_output_options(*command, *arguments);
   command->footer(
       "Example:\n"
       "  qmpipe build dem.tif -o tiles --attribution \"(c) Survey Office\"\n"
+      "  qmpipe build dem.tif -o alps.mbtiles\n"
       "  qmpipe build fine.tif coarse.tif -o tiles --max-zoom 12 --tolerance-at 12=2 --memory 2G\n"
       "A run that was stopped, killed or failed goes on where it was: give the same command "
       "again.\n"

@@ -5,10 +5,10 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
-#include <system_error>
 
 #include "formats/errors.h"
 #include "formats/tile_path.h"
+#include "formats/tile_set.h"
 #include "tools/info_report.h"
 
 namespace qmpipe {
@@ -16,12 +16,13 @@ namespace {
 
 constexpr const char* kFooter =
     "Sizes are in bytes, heights in metres above the WGS84 ellipsoid, positions in metres.\n"
-    "Exit code 1: layer.json is missing or damaged, or the tile is no valid tile.\n"
+    "Exit code 1: layer.json is missing or damaged, or the tile is missing or damaged.\n"
     "\n"
     "Examples:\n"
     "  qmpipe info out\n"
     "  qmpipe info out/10/1073/712.terrain --json\n"
-    "  qmpipe info out/10/1073/712.terrain --mesh tile.glb";
+    "  qmpipe info out/10/1073/712.terrain --mesh tile.glb\n"
+    "  qmpipe info out.mbtiles --key 10/1073/712";
 
 struct InfoArguments {
   std::string path;
@@ -39,28 +40,29 @@ TileKey parse_key(const std::string& text) {
       fmt::format("--key {}: write it as zoom/x/y with y from the south, e.g. 10/3/7", text));
 }
 
-bool is_tile_set(const std::filesystem::path& path) {
-  std::error_code code;
-  return std::filesystem::is_directory(path, code) || path.filename() == "layer.json";
-}
-
 int run_info(const InfoArguments& arguments) {
-  if (arguments.mesh_path.empty()) {
-    const ReportStyle style = arguments.wants_json ? ReportStyle::kJson : ReportStyle::kText;
-    return is_tile_set(arguments.path) ? report_tile_set(arguments.path, style)
-                                       : report_tile(arguments.path, style);
-  }
-  if (is_tile_set(arguments.path)) {
+  const ReportStyle style = arguments.wants_json ? ReportStyle::kJson : ReportStyle::kText;
+  const bool in_set = is_tile_set(arguments.path);
+  const std::optional<TileKey> key =
+      arguments.key.empty() ? std::nullopt : std::optional(parse_key(arguments.key));
+  const bool wants_mesh = !arguments.mesh_path.empty();
+  if (in_set && !key) {
+    if (!wants_mesh) return report_tile_set(arguments.path, style);
     throw UsageError(
-        fmt::format("--mesh writes a single tile; {} is a tile set: name one of its .terrain files",
+        fmt::format("--mesh writes a single tile; {} is a tile set: name the tile with --key "
+                    "zoom/x/y, or one of its .terrain files",
                     arguments.path));
   }
-  MeshRequest request = {.tile_path = arguments.path,
+  if (key && !in_set && !wants_mesh) {
+    throw UsageError("--key: names a tile of a set, or says where a tile lies for --mesh");
+  }
+  const TilePlace place = {.path = arguments.path, .key_in_set = in_set ? key : std::nullopt};
+  if (!wants_mesh) return report_tile(place, style);
+  MeshRequest request = {.place = place,
                          .mesh_path = arguments.mesh_path,
                          .frame = arguments.frame == "ecef" ? Frame::kEcef : Frame::kEnu,
-                         .key = std::nullopt,
+                         .key = in_set ? std::nullopt : key,
                          .projection = std::nullopt};
-  if (!arguments.key.empty()) request.key = parse_key(arguments.key);
   if (!arguments.projection.empty()) {
     request.projection =
         arguments.projection == "mercator" ? Projection::kMercator : Projection::kGeodetic;
@@ -74,7 +76,9 @@ void register_info(CLI::App& app, std::function<int()>& action) {
   const auto arguments = std::make_shared<InfoArguments>();
   CLI::App* command =
       app.add_subcommand("info", "Show what a tile set or a tile holds; write a tile as a mesh");
-  command->add_option("path", arguments->path, "Folder of a tile set, its layer.json, or a tile")
+  command
+      ->add_option("path", arguments->path,
+                   "Folder of a tile set, its layer.json, an .mbtiles file, or a tile")
       ->required()
       ->type_name("OUT|TILE");
   CLI::Option* json =
@@ -94,9 +98,10 @@ void register_info(CLI::App& app, std::function<int()>& action) {
       ->needs(mesh)
       ->check(CLI::IsMember({"enu", "ecef"}));
   command
-      ->add_option("--key", arguments->key,
-                   "Which tile it is. DEFAULT: the end of its path, .../zoom/x/y.terrain")
-      ->needs(mesh)
+      ->add_option(
+          "--key", arguments->key,
+          "The tile of a set to show or to write. With --mesh of a tile's file: which tile it "
+          "is. DEFAULT: the end of its path, .../zoom/x/y.terrain")
       ->type_name("ZOOM/X/Y");
   command
       ->add_option("--projection", arguments->projection,

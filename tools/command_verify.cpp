@@ -76,7 +76,9 @@ void register_verify(CLI::App& app, std::function<int()>& action) {
       "verify",
       "Check a finished tile set: tiles, cracks, layer.json, and heights against a source");
   command->footer(kFooter);
-  command->add_option("OUT", arguments->path, "The tile set's folder, or the layer.json in it")
+  command
+      ->add_option("OUT", arguments->path,
+                   "The tile set: its folder, the layer.json in it, or an .mbtiles file")
       ->required();
   command
       ->add_option("--source", options.sources,

@@ -30,13 +30,22 @@ struct TileFile {
   Result<QuantizedMesh> mesh = Error{};
 };
 
-TileFile read_tile_file(const fs::path& path) {
+std::string text_of(const TilePlace& place) {
+  return place.path.string() + (place.key_in_set ? ": tile " + to_string(*place.key_in_set) : "");
+}
+
+Result<std::vector<std::uint8_t>> stored_bytes_of(const TilePlace& place) {
+  if (place.key_in_set) return open_tile_set(place.path)->read(*place.key_in_set);
   std::error_code code;
-  if (!fs::exists(path, code)) {
-    throw IoError("cannot open the tile", path.string(),
+  if (!fs::exists(place.path, code)) {
+    throw IoError("cannot open the tile", place.path.string(),
                   code ? code.message() : "there is no such file", "Check the path.");
   }
-  Result<std::vector<std::uint8_t>> stored = read_file_bytes(path, kLargestTileBytes);
+  return read_file_bytes(place.path, kLargestTileBytes);
+}
+
+TileFile read_tile(const TilePlace& place) {
+  Result<std::vector<std::uint8_t>> stored = stored_bytes_of(place);
   TileFile file;
   if (!stored) {
     file.mesh = stored.error();
@@ -74,14 +83,14 @@ std::vector<std::string> extensions_of(const QuantizedMesh& mesh) {
   return names;
 }
 
-void print_text(const fs::path& path, const TileFile& file) {
+void print_text(const TilePlace& place, const TileFile& file) {
   const QuantizedMesh& mesh = *file.mesh;
   const QuantizedMeshHeader& header = mesh.header;
   const auto [low, high] = std::minmax_element(mesh.h.begin(), mesh.h.end());
   const auto line = [](const char* name, const std::string& value) {
     fmt::print("{:<19}{}\n", name, value);
   };
-  line("tile", path.string());
+  line("tile", text_of(place));
   line("stored", fmt::format("{} bytes{}", file.stored_bytes, file.is_packed ? ", gzip" : ""));
   line("plain", fmt::format("{} bytes", file.plain_bytes));
   line("vertices", std::to_string(mesh.vertex_count()));
@@ -108,11 +117,12 @@ void print_text(const fs::path& path, const TileFile& file) {
                                         occlusion[1], occlusion[2]));
 }
 
-void print_json(const fs::path& path, const TileFile& file) {
-  Json document = {{"path", path.string()},
-                   {"stored_bytes", file.stored_bytes},
-                   {"plain_bytes", file.plain_bytes},
-                   {"gzip", file.is_packed}};
+void print_json(const TilePlace& place, const TileFile& file) {
+  Json document = {{"path", place.path.string()}};
+  if (place.key_in_set) document["key"] = to_string(*place.key_in_set);
+  document["stored_bytes"] = file.stored_bytes;
+  document["plain_bytes"] = file.plain_bytes;
+  document["gzip"] = file.is_packed;
   if (!file.mesh) {
     document["error"] = file.mesh.error().message;
   } else {
@@ -139,8 +149,8 @@ void print_json(const fs::path& path, const TileFile& file) {
   fmt::print("{}\n", document.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
-int report_fault(const fs::path& path, const std::string& fault) {
-  fmt::print(stderr, "qmpipe: {} is no valid tile: {}\n", path.string(), fault);
+int report_fault(const TilePlace& place, const std::string& fault) {
+  fmt::print(stderr, "qmpipe: {} is no valid tile: {}\n", text_of(place), fault);
   return 1;
 }
 
@@ -149,24 +159,36 @@ struct Placement {
   RectangleDeg rectangle_deg;
 };
 
-Placement placement_of(const MeshRequest& request) {
-  const fs::path path = fs::absolute(request.tile_path).lexically_normal();
-  std::optional<TileKey> key = request.key ? request.key : parse_tile_path(path);
-  if (!key) {
-    throw UsageError(fmt::format("cannot tell from the path which tile {} is; pass --key zoom/x/y",
-                                 request.tile_path.string()));
-  }
-  Projection projection = request.projection.value_or(Projection::kGeodetic);
+// The text of the layer.json that says where the tile lies; none where there is no such file.
+std::optional<Result<std::string>> layer_text_of(const TilePlace& place) {
+  if (place.key_in_set) return open_tile_set(place.path)->layer_text();
   // zoom/x/y.terrain stands in the folder of layer.json.
+  const fs::path path = fs::absolute(place.path).lexically_normal();
   const fs::path layer_path = path.parent_path().parent_path().parent_path() / "layer.json";
   std::error_code code;
-  if (!request.key && fs::exists(layer_path, code)) {
-    const auto bytes = read_file_bytes(layer_path, kLargestTileBytes);
-    const auto layer = bytes ? parse_layer_json({bytes->begin(), bytes->end()})
-                             : Result<ParsedLayerJson>(bytes.error());
+  if (!fs::exists(layer_path, code)) return std::nullopt;
+  const auto bytes = read_file_bytes(layer_path, kLargestTileBytes);
+  if (!bytes) return bytes.error();
+  return std::string(bytes->begin(), bytes->end());
+}
+
+Placement placement_of(const MeshRequest& request) {
+  const TilePlace& place = request.place;
+  std::optional<TileKey> key = request.key ? request.key
+                               : place.key_in_set
+                                   ? place.key_in_set
+                                   : parse_tile_path(fs::absolute(place.path).lexically_normal());
+  if (!key) {
+    throw UsageError(fmt::format("cannot tell from the path which tile {} is; pass --key zoom/x/y",
+                                 place.path.string()));
+  }
+  Projection projection = request.projection.value_or(Projection::kGeodetic);
+  const auto text = request.key ? std::nullopt : layer_text_of(place);
+  if (text) {
+    const auto layer = *text ? parse_layer_json(**text) : Result<ParsedLayerJson>(text->error());
     if (!layer && !request.projection) {
-      throw UsageError(
-          fmt::format("{}: {}; pass --projection", layer_path.string(), layer.error().message));
+      throw UsageError(fmt::format("the layer.json of {}: {}; pass --projection",
+                                   place.path.string(), layer.error().message));
     }
     if (layer && !request.projection) projection = layer->layer.projection;
     if (layer && layer->scheme == "slippyMap" && key->zoom <= kMaxZoom) {
@@ -224,21 +246,21 @@ ExportMesh export_mesh_of(const QuantizedMesh& mesh, const RectangleDeg& rectang
 
 }  // namespace
 
-int report_tile(const fs::path& path, ReportStyle style) {
-  const TileFile file = read_tile_file(path);
+int report_tile(const TilePlace& place, ReportStyle style) {
+  const TileFile file = read_tile(place);
   if (style == ReportStyle::kJson) {
-    print_json(path, file);
+    print_json(place, file);
   } else if (file.mesh) {
-    print_text(path, file);
+    print_text(place, file);
   }
-  return file.mesh ? 0 : report_fault(path, file.mesh.error().message);
+  return file.mesh ? 0 : report_fault(place, file.mesh.error().message);
 }
 
 int write_tile_mesh(const MeshRequest& request) {
-  const TileFile file = read_tile_file(request.tile_path);
-  if (!file.mesh) return report_fault(request.tile_path, file.mesh.error().message);
+  const TileFile file = read_tile(request.place);
+  if (!file.mesh) return report_fault(request.place, file.mesh.error().message);
   if (file.mesh->indices.empty()) {
-    return report_fault(request.tile_path, "it has no triangles to write");
+    return report_fault(request.place, "it has no triangles to write");
   }
   const Placement placement = placement_of(request);
   write_mesh_file(request.mesh_path,

@@ -1,5 +1,5 @@
 // The program's one entry: parses, runs the command, and turns every error into a message and an
-// exit code (0 done, 1 failed, 2 usage, 3 verify found faults, 130 interrupted).
+// exit code (0 done, 1 failed, 2 usage, 3 faults or differences found, 130 interrupted).
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <functional>
@@ -10,9 +10,13 @@
 #include "pipeline/progress.h"
 #include "pipeline/version.h"
 #include "tools/command_build.h"
+#include "tools/command_check.h"
 #include "tools/command_compare.h"
+#include "tools/command_convert.h"
 #include "tools/command_detail.h"
+#include "tools/command_diff.h"
 #include "tools/command_info.h"
+#include "tools/command_serve.h"
 #include "tools/command_synth.h"
 #include "tools/command_tin.h"
 #include "tools/command_verify.h"
@@ -40,7 +44,11 @@ int run(int argc, char** argv) {
   std::function<int()> action;
   qmpipe::register_build(app, action);
   qmpipe::register_verify(app, action);
+  qmpipe::register_serve(app, action);
+  qmpipe::register_check(app, action);
   qmpipe::register_compare(app, action);
+  qmpipe::register_convert(app, action);
+  qmpipe::register_diff(app, action);
   qmpipe::register_info(app, action);
   qmpipe::register_detail(app, action);
   qmpipe::register_tin(app, action);

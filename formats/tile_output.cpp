@@ -1,0 +1,64 @@
+#include "formats/tile_output.h"
+
+#include <algorithm>
+#include <cctype>
+#include <string>
+
+#include "formats/errors.h"
+#include "formats/folder_sink.h"
+#include "formats/mbtiles.h"
+
+namespace qmpipe {
+namespace {
+
+[[noreturn]] void refuse_pmtiles(const std::filesystem::path& output) {
+  std::filesystem::path packed = output;
+  packed.replace_extension(".mbtiles");
+  throw UsageError(output.string() +
+                   ": a PMTiles file is packed from a finished tile set, in an order that no build "
+                   "keeps; build " +
+                   packed.string() + ", then: qmpipe convert " + packed.string() + " -o " +
+                   output.string());
+}
+
+}  // namespace
+
+TileForm form_of(const std::filesystem::path& output) {
+  std::string extension = output.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".mbtiles") return TileForm::kMbtiles;
+  if (extension == ".pmtiles") return TileForm::kPmtiles;
+  return TileForm::kFolder;
+}
+
+std::unique_ptr<TileSink> open_tile_sink(const std::filesystem::path& output, Overwrite overwrite) {
+  switch (form_of(output)) {
+    case TileForm::kFolder:
+      return open_folder_sink(output, overwrite);
+    case TileForm::kMbtiles:
+      return open_mbtiles_sink(output, overwrite);
+    case TileForm::kPmtiles:
+      break;
+  }
+  refuse_pmtiles(output);
+}
+
+std::unique_ptr<TileSink> resume_tile_sink(const std::filesystem::path& output) {
+  switch (form_of(output)) {
+    case TileForm::kFolder:
+      return resume_folder_sink(output);
+    case TileForm::kMbtiles:
+      return resume_mbtiles_sink(output);
+    case TileForm::kPmtiles:
+      break;
+  }
+  refuse_pmtiles(output);
+}
+
+std::filesystem::path report_path(const std::filesystem::path& output) {
+  if (form_of(output) == TileForm::kFolder) return output / "report.json";
+  return output.string() + ".report.json";
+}
+
+}  // namespace qmpipe

@@ -1,0 +1,121 @@
+// A headless Chromium, a `qmpipe serve`, and what a page may not do: shared by the browser tests.
+
+import assert from 'node:assert/strict';
+import { execFileSync, spawn } from 'node:child_process';
+import { once } from 'node:events';
+import { existsSync } from 'node:fs';
+import { createInterface } from 'node:readline';
+
+const chromiumPath = '/usr/bin/chromium';
+const skipped = 77;  // what ctest takes for a test that was left out
+const chromium = await import('playwright-core').then((module) => module.chromium).catch(() => null);
+if (!chromium || !existsSync(chromiumPath)) {
+  console.log('skipped: there is no playwright-core or no Chromium; run tools/setup.sh --dev');
+  process.exit(skipped);
+}
+const chromiumFlags = [
+  '--headless', '--no-sandbox', '--disable-quic', '--no-first-run',
+  '--disable-background-networking', '--disable-component-update', '--disable-sync',
+];
+// WebGL without a graphics card.
+const softwareWebGl = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+
+export const program = process.env.QMPIPE_PROGRAM;
+assert(program, 'QMPIPE_PROGRAM names the program to test');
+
+export function run(command, ...args) {
+  return execFileSync(command, args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'] });
+}
+
+export const qmpipe = (...args) => run(program, ...args);
+
+export const launch = (...flags) => chromium.launch({
+  executablePath: chromiumPath,
+  args: [...chromiumFlags, ...(flags.length > 0 ? flags : softwareWebGl)],
+});
+
+// Serves a set, calls visit(address), and ends the server whatever happens.
+export async function withServer(set, visit) {
+  const server = spawn(program, ['serve', set, '--port', '0', '--json'],
+                       { stdio: ['ignore', 'pipe', 'inherit'] });
+  try {
+    const lines = createInterface({ input: server.stdout });
+    const [line] = await Promise.race([
+      once(lines, 'line'),
+      once(server, 'exit').then(([code]) => { throw new Error(`serve ended with ${code}`); }),
+    ]);
+    const said = JSON.parse(line);
+    await visit(said.viewer, said);
+  } finally {
+    const ended = server.exitCode === null ? once(server, 'exit') : [server.exitCode];
+    server.kill('SIGINT');
+    const [code] = await ended;
+    assert.equal(code, 0, 'the server ends with exit code 0 on an interrupt');
+  }
+}
+
+// A page that collects everything that went wrong on it.
+export async function openPage(browser, viewport = { width: 960, height: 640 }) {
+  const page = await browser.newPage({ viewport });
+  const wrong = [];
+  const seen = new Map();  // by address: status
+  page.on('console', (message) => {
+    if (message.type() === 'error') wrong.push(`console: ${message.text()}`);
+  });
+  page.on('pageerror', (error) => wrong.push(`exception: ${error}`));
+  page.on('requestfailed', (request) => {
+    wrong.push(`failed: ${request.url()} ${request.failure()?.errorText}`);
+  });
+  page.on('response', (response) => {
+    seen.set(response.url(), response.status());
+    if (response.status() >= 400) wrong.push(`${response.status()}: ${response.url()}`);
+  });
+  return { page, wrong, seen };
+}
+
+// Until every tile that the view needs is drawn, and stays so for a while.
+export async function waitForTiles(page, timeout = 120000) {
+  await page.waitForFunction(() => window.qmpipe !== undefined, null, { timeout });
+  await page.waitForFunction(() => {
+    const globe = window.qmpipe.viewer.scene.globe;
+    const drawn = globe._surface._tilesToRender.map((tile) => `${tile.level}/${tile.x}/${tile.y}`);
+    const picture = drawn.sort().join(' ');
+    const now = performance.now();
+    const state = window.qmpipe.waiting ??= { picture: '', since: now };
+    window.qmpipe.viewer.scene.requestRender();
+    if (!globe.tilesLoaded || picture === '' || picture !== state.picture) {
+      Object.assign(state, { picture, since: now });
+    }
+    return now - state.since > 1500;
+  }, null, { timeout, polling: 100 });
+  return page.evaluate(() => {
+    delete window.qmpipe.waiting;
+    const levels = window.qmpipe.viewer.scene.globe._surface._tilesToRender.map((t) => t.level);
+    return { drawn: levels.length, deepest: Math.max(...levels) };
+  });
+}
+
+// What a screenshot looks like: mean and spread of its brightness (0..255), and how many of 4096
+// colours it has.
+export async function lookAt(page, png) {
+  return page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const brush = canvas.getContext('2d');
+    brush.drawImage(image, 0, 0);
+    const { data } = brush.getImageData(0, 0, image.width, image.height);
+    let sum = 0;
+    let squares = 0;
+    const colours = new Set();
+    for (let at = 0; at < data.length; at += 4) {
+      const bright = (data[at] + data[at + 1] + data[at + 2]) / 3;
+      sum += bright;
+      squares += bright * bright;
+      colours.add(((data[at] >> 4) << 8) | ((data[at + 1] >> 4) << 4) | (data[at + 2] >> 4));
+    }
+    const count = data.length / 4;
+    const mean = sum / count;
+    return { mean, spread: Math.sqrt(squares / count - mean * mean), colours: colours.size };
+  }, png.toString('base64'));
+}

@@ -1,0 +1,44 @@
+// A web server over plain HTTP for one machine or a trusted network.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "tools/tile_service.h"
+
+namespace qmpipe {
+
+struct ListenOptions {
+  std::string host = "127.0.0.1";
+  int port = 8080;   // 0: any free one
+  int threads = 64;  // as many connections are served at a time; others wait
+};
+
+// Answers GET and HEAD through a handler that may be called from any thread; OPTIONS, other methods,
+// malformed requests and addresses that the handler does not know are answered here, with 4xx and an
+// {"error"} where something is wrong. Every answer allows any origin.
+class HttpServer {
+ public:
+  using Handler = std::function<std::optional<HttpReply>(const HttpRequest&)>;
+
+  // Listens from now on. Throws IoError when the address cannot be had, as when another program has
+  // the port.
+  HttpServer(const ListenOptions& options, Handler handler);
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  int port() const { return port_; }
+  // Serves until `stop` is true.
+  void run(const std::atomic<bool>& stop);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+  int port_ = 0;
+};
+
+}  // namespace qmpipe
