@@ -7,6 +7,8 @@ import { existsSync } from 'node:fs';
 import { createInterface } from 'node:readline';
 
 const chromiumPath = '/usr/bin/chromium';
+// Drawing in software on a busy machine takes its time; what is wrong shows long before.
+const patience = 180000;
 const skipped = 77;  // what ctest takes for a test that was left out
 const chromium = await import('playwright-core').then((module) => module.chromium).catch(() => null);
 if (!chromium || !existsSync(chromiumPath)) {
@@ -57,6 +59,7 @@ export async function withServer(set, visit) {
 // A page that collects everything that went wrong on it.
 export async function openPage(browser, viewport = { width: 960, height: 640 }) {
   const page = await browser.newPage({ viewport });
+  page.setDefaultTimeout(patience);
   const wrong = [];
   const seen = new Map();  // by address: status
   page.on('console', (message) => {
@@ -74,8 +77,8 @@ export async function openPage(browser, viewport = { width: 960, height: 640 }) 
 }
 
 // Until every tile that the view needs is drawn, and stays so for a while.
-export async function waitForTiles(page, timeout = 120000) {
-  await page.waitForFunction(() => window.qmpipe !== undefined, null, { timeout });
+export async function waitForTiles(page) {
+  await page.waitForFunction(() => window.qmpipe !== undefined);
   await page.waitForFunction(() => {
     const globe = window.qmpipe.viewer.scene.globe;
     const drawn = globe._surface._tilesToRender.map((tile) => `${tile.level}/${tile.x}/${tile.y}`);
@@ -87,7 +90,7 @@ export async function waitForTiles(page, timeout = 120000) {
       Object.assign(state, { picture, since: now });
     }
     return now - state.since > 1500;
-  }, null, { timeout, polling: 100 });
+  }, null, { polling: 100 });
   return page.evaluate(() => {
     delete window.qmpipe.waiting;
     const levels = window.qmpipe.viewer.scene.globe._surface._tilesToRender.map((t) => t.level);

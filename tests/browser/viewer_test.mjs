@@ -151,8 +151,7 @@ test('the switches change the picture, closer tiles are deeper, and the cursor h
     const whole = await lookAt(page, await page.screenshot());
     await page.mouse.move(480, 320);
     await page.waitForFunction(
-        () => document.getElementById('cursor').textContent.includes('deepest tile'), null,
-        { timeout: 60000 });
+        () => document.getElementById('cursor').textContent.includes('deepest tile'));
     const text = await page.evaluate(() => document.getElementById('cursor').textContent);
     const [, lat, lon, height] = text.match(/([\d.]+)° N\s+([\d.]+)° E\s+(-?[\d.]+) m/);
     // Between posts the surface is the mesh's, a little farther off than at posts.
@@ -180,7 +179,7 @@ test('a browser without WebGL is told so in words', patience, async () => {
     await withServer(sets.folder, async (address) => {
       const { page, wrong } = await openPage(blind);
       await page.goto(address);
-      await page.waitForSelector('text=no WebGL', { timeout: 60000 });
+      await page.waitForSelector('text=no WebGL');
       assert.deepEqual(wrong, []);
     });
   } finally {
@@ -200,7 +199,7 @@ test('a server without CesiumJS says how to get it', patience, async () => {
     await withServer(sets.folder, async (address) => {
       const { page } = await openPage(browser);
       await page.goto(address);
-      await page.waitForSelector('text=tools/setup.sh', { timeout: 60000 });
+      await page.waitForSelector('text=tools/setup.sh');
       await page.close();
     });
   } finally {
