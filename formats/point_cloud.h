@@ -18,7 +18,7 @@ namespace qmpipe {
 
 struct PointReadOptions {
   // Classes of a LAS file to keep. DEFAULT: all but noise (7, and 18 in point formats 6 to 10).
-  std::vector<std::uint8_t> classes;
+  std::vector<std::uint8_t> classes = {};
   // Of each square of this many metres keep the point that is nearest to its centre: unlike the lowest
   // or the highest it takes no side, and what is left is spaced evenly. DEFAULT: 0, all.
   double thin_m = 0;
@@ -26,7 +26,7 @@ struct PointReadOptions {
   // three, within some 36). DEFAULT: 0, none, because a mast or a sharp peak is such a point too.
   double outlier_m = 0;
   // Anything GDAL understands as a CRS. DEFAULT: empty, what the file says.
-  std::string source_crs;
+  std::string source_crs = {};
 };
 
 // What became of the points of the file; those that are left are the cloud's.
