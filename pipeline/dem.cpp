@@ -9,7 +9,7 @@
 
 #include "formats/errors.h"
 #include "formats/quantized_mesh.h"
-#include "stages/geodesy.h"
+#include "formats/wgs84.h"
 #include "stages/void_posts.h"
 
 namespace qmpipe {
@@ -36,14 +36,8 @@ PostSpacing spacing_on_ellipsoid(const RasterInfo& info) {
                   "check its bounds with gdalinfo; name the right CRS with --source-crs EPSG:n");
   }
   constexpr double kDegree = std::numbers::pi / 180;
-  const double sine = std::sin(middle_deg * kDegree);
   const double cosine = std::cos(middle_deg * kDegree);
-  constexpr double kAxesRatio = kPolarRadiusM / kEquatorialRadiusM;
-  constexpr double kEccentricitySquared = 1 - kAxesRatio * kAxesRatio;
-  const double w = std::sqrt(1 - kEccentricitySquared * sine * sine);
-  // Radii of curvature across the meridian and along it.
-  const double across_m = kEquatorialRadiusM / w;
-  const double along_m = kEquatorialRadiusM * (1 - kEccentricitySquared) / (w * w * w);
+  const auto [across_m, along_m] = curvature_radii(middle_deg);
   return {.x_m = std::abs(info.plane.x_per_column) * info.plane.unit * kDegree * across_m * cosine,
           .y_m = std::abs(info.plane.y_per_row) * info.plane.unit * kDegree * along_m};
 }

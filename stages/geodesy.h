@@ -7,11 +7,9 @@
 #include <span>
 
 #include "formats/quantized_mesh.h"
+#include "formats/wgs84.h"
 
 namespace qmpipe {
-
-inline constexpr double kEquatorialRadiusM = 6378137.0;
-inline constexpr double kPolarRadiusM = 6356752.3142451793;
 
 struct GeoPoint {
   double longitude_deg = 0;
