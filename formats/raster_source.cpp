@@ -227,6 +227,7 @@ void RasterSource::Impl::describe(const std::string& path) {
 
 void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
   info.crs_name = crs.name;
+  info.crs_wkt = crs.text.wkt;
   info.is_geographic = crs.is_geographic;
   info.has_vertical_datum = crs.has_vertical_datum;
   info.assumptions.insert(info.assumptions.end(), crs.assumptions.begin(), crs.assumptions.end());

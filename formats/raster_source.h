@@ -52,6 +52,7 @@ struct RasterInfo {
   std::string path;
   std::string driver;
   std::string crs_name;
+  std::string crs_wkt;  // of x and y; empty: unknown
   bool is_geographic = false;
   bool has_vertical_datum = false;  // the CRS is compound or 3D
   std::string type_name;            // GDAL's name of the band's type, e.g. "Int16"

@@ -77,6 +77,67 @@ std::vector<std::int32_t> rounded_heights(const Dem& dem, double step_m) {
   return z;
 }
 
+// The finest mesh and where it lies.
+struct Input {
+  DetailBase base;
+  DetailFrame frame;
+  std::string crs_wkt;
+};
+
+void note_assumptions(const std::string& path, const std::vector<std::string>& assumptions,
+                      Progress& progress) {
+  for (const std::string& assumption : assumptions) progress.note(path + ": " + assumption);
+}
+
+Input read_dem_input(const DetailBuildOptions& options, Progress& progress,
+                     DetailBuildReport& report) {
+  Clock::time_point start = Clock::now();
+  const std::unique_ptr<RasterSource> source = RasterSource::open(
+      options.input, {.crs_override = options.points.source_crs, .placing = Placing::kPlane});
+  const Dem dem = read_dem(*source);
+  note_assumptions(options.input, dem.info.assumptions, progress);
+  Input input;
+  input.frame = frame_of(dem, options.height_step_m);
+  input.crs_wkt = dem.info.crs_wkt;
+  const std::vector<std::int32_t> z = rounded_heights(dem, input.frame.step_m[2]);
+  report.read_s = seconds_since(start);
+  start = Clock::now();
+  input.base = grid_base(
+      {.columns = dem.grid.width_posts, .rows = dem.grid.height_posts, .z = z, .valid = dem.valid},
+      block_grid_of(options.blocks));
+  report.triangulate_s = seconds_since(start);
+  std::size_t used = 0;
+  for (const BaseBlock& block : input.base.blocks) used += block.points.size();
+  report.left_out = static_cast<std::int64_t>(dem.post_count()) - static_cast<std::int64_t>(used);
+  return input;
+}
+
+Input read_cloud_input(const DetailBuildOptions& options, Progress& progress,
+                       DetailBuildReport& report) {
+  Clock::time_point start = Clock::now();
+  const PointCloud cloud = read_point_cloud(options.input, options.points);
+  note_assumptions(options.input, cloud.assumptions, progress);
+  report.left_out = static_cast<std::int64_t>(cloud.counts.in_file) -
+                    static_cast<std::int64_t>(cloud.points.size());
+  report.left_out_text = left_out(cloud.counts);
+  report.read_s = seconds_since(start);
+  start = Clock::now();
+  Input input;
+  input.frame = cloud.frame;
+  input.crs_wkt = cloud.crs_wkt;
+  auto parts = split_into_blocks(cloud.points, block_grid_of(options.blocks));
+  input.base.blocks.resize(parts.size());
+  tbb::task_arena arena(options.threads);
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t b) {
+      input.base.blocks[b] = triangulate_block(std::move(parts[b]));
+    });
+  });
+  input.base.seams = join_hulls(input.base.blocks);
+  report.triangulate_s = seconds_since(start);
+  return input;
+}
+
 std::size_t triangle_count(const DetailBase& base) {
   std::size_t count = base.seams.size();
   for (const BaseBlock& block : base.blocks) count += block.triangles.size() / 3;
@@ -141,28 +202,16 @@ DetailModel simplify_base(DetailBase base, const DetailFrame& frame,
 DetailBuilt build_detail(const DetailBuildOptions& options, Progress& progress) {
   require_sound(options);
   DetailBuilt built;
-  Clock::time_point start = Clock::now();
-  const std::unique_ptr<RasterSource> source = RasterSource::open(
-      options.input, {.crs_override = options.source_crs, .placing = Placing::kPlane});
-  const Dem dem = read_dem(*source);
-  const DetailFrame frame = frame_of(dem, options.height_step_m);
-  const std::vector<std::int32_t> z = rounded_heights(dem, frame.step_m[2]);
-  built.report.read_s = seconds_since(start);
-
-  start = Clock::now();
-  DetailBase base = grid_base(
-      {.columns = dem.grid.width_posts, .rows = dem.grid.height_posts, .z = z, .valid = dem.valid},
-      block_grid_of(options.blocks));
-  if (triangle_count(base) == 0) {
-    throw IoError("cannot make a model of", options.input, "no three valid pixels lie side by side",
-                  "check it with gdalinfo -stats");
+  Input input = is_point_file(options.input) ? read_cloud_input(options, progress, built.report)
+                                             : read_dem_input(options, progress, built.report);
+  if (triangle_count(input.base) == 0) {
+    throw IoError("cannot make a model of", options.input,
+                  "there are no three valid points that make a triangle",
+                  "check what is in it, as with gdalinfo -stats");
   }
-  built.report.triangulate_s = seconds_since(start);
-
-  start = Clock::now();
-  built.model = simplify_base(std::move(base), frame, options, progress, built.report);
-  built.model.crs_wkt = dem.info.crs_name;
-  built.report.left_out = static_cast<std::int64_t>(dem.post_count()) - built.report.points;
+  const Clock::time_point start = Clock::now();
+  built.model = simplify_base(std::move(input.base), input.frame, options, progress, built.report);
+  built.model.crs_wkt = input.crs_wkt;
   built.report.simplify_s = seconds_since(start);
   return built;
 }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "formats/detail_data.h"
+#include "formats/point_cloud.h"
 #include "pipeline/progress.h"
 #include "stages/detail_base.h"
 
@@ -14,8 +15,8 @@ namespace qmpipe {
 
 struct DetailBuildOptions {
   std::string input;
-  // As in OpenOptions. DEFAULT: empty, the file's own.
-  std::string source_crs = {};
+  // How points are read; the CRS counts for DEMs too.
+  PointReadOptions points = {};
   // Part of the triangles that the coarsest level keeps. DEFAULT: 0.2, as in the paper.
   double keep_share = 0.2;
   // DEFAULT: 4, as in the paper.
@@ -30,7 +31,9 @@ struct DetailBuildOptions {
 
 struct DetailBuildReport {
   std::int64_t points = 0;
-  std::int64_t left_out = 0;  // voids and points without a triangle
+  // Voids and posts without a triangle; of a cloud what PointCounts counts.
+  std::int64_t left_out = 0;
+  std::string left_out_text;  // why, of a cloud
   std::int64_t finest_triangles = 0;
   std::int64_t coarsest_triangles = 0;
   std::int64_t seam_triangles = 0;
@@ -45,8 +48,8 @@ struct DetailBuilt {
   DetailBuildReport report;
 };
 
-// Throws UsageError for options that make no sense, IoError when the input cannot be read or has no
-// triangle.
+// Points (is_point_file()) or else a raster. Notes what had to be assumed. Throws UsageError for options
+// that make no sense, IoError when the input cannot be read or has no triangle.
 DetailBuilt build_detail(const DetailBuildOptions& options, Progress& progress);
 
 // Simplifies each block of a base, in parallel. `report` gets the counts of triangles and collapses.

@@ -29,6 +29,7 @@ constexpr const char* kFooter =
     "\n"
     "Examples:\n"
     "  qmpipe detail build dem.tif -o terrain.h5\n"
+    "  qmpipe detail build survey.las -o terrain.h5 --classes ground --thin 0.5\n"
     "  qmpipe detail build dem.tif -o terrain.h5 --blocks 64 --keep 5% --interval 1000\n"
     "Exit codes: 0 written, 1 failed, 2 wrong usage, 130 interrupted.";
 
@@ -36,6 +37,7 @@ struct BuildArguments {
   DetailBuildOptions options;
   std::string output;
   std::string keep = "20%";
+  std::string classes;
   bool json = false;
 };
 
@@ -70,7 +72,8 @@ void print_text(const BuildArguments& arguments, const DetailBuilt& built,
                    file_bytes,
                    static_cast<double>(file_bytes) /
                        static_cast<double>(std::max<std::int64_t>(1, report.finest_triangles))));
-  line("points", fmt::format("{}, {} left out", report.points, report.left_out));
+  line("points", fmt::format("{}, {} left out{}", report.points, report.left_out,
+                             report.left_out_text.empty() ? "" : ": " + report.left_out_text));
   line("triangles",
        fmt::format("{} at the finest level, {} at the coarsest, {} of them in seams",
                    report.finest_triangles, report.coarsest_triangles, report.seam_triangles));
@@ -102,6 +105,9 @@ void print_json(const BuildArguments& arguments, const DetailBuilt& built,
 
 int run_build(BuildArguments arguments) {
   arguments.options.keep_share = parse_keep(arguments.keep);
+  if (!arguments.classes.empty()) {
+    arguments.options.points.classes = parse_point_classes(arguments.classes);
+  }
   require_output(arguments);
   ProgressStyle style =
       ::isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent;
@@ -123,12 +129,14 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
   const auto arguments = std::make_shared<BuildArguments>();
   DetailBuildOptions& options = arguments->options;
   options.threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
-  CLI::App* command = detail.add_subcommand("build", "Turn a DEM into a detail-increment model");
+  CLI::App* command =
+      detail.add_subcommand("build", "Turn points or a DEM into a detail-increment model");
   command->footer(kFooter);
   command
       ->add_option(
           "INPUT", options.input,
-          "Raster of any GDAL format, 2 x 2 to 32768 x 32768 pixels; each pixel is a point")
+          "Points as LAS 1.0 to 1.4 (.las) or text (.xyz, .csv, .txt: x, y and z in a line), or "
+          "a raster of any GDAL format, 2 x 2 to 32768 x 32768 pixels")
       ->required();
   command->add_option("-o,--output", arguments->output, "Model to write (HDF5)")
       ->required()
@@ -155,7 +163,25 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
           "whole metres, else 0.01)")
       ->type_name("M");
   command
-      ->add_option("--source-crs", options.source_crs,
+      ->add_option("--classes", arguments->classes,
+                   "Classes of a LAS file to keep: ground, or numbers between commas (default: all "
+                   "but noise)")
+      ->type_name("LIST");
+  command
+      ->add_option("--thin", options.points.thin_m,
+                   "Keep one point of each square of so many metres, the one nearest to its centre "
+                   "(points only; 0: all)")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("M");
+  command
+      ->add_option(
+          "--outliers", options.points.outlier_m,
+          "Leave out a point so many metres above or below all others around it (points only; "
+          "0: none, for a mast or a sharp peak is such a point too)")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("M");
+  command
+      ->add_option("--source-crs", options.points.source_crs,
                    "Take this CRS instead of the one that the input names (EPSG:n, WKT, PROJ)")
       ->type_name("CRS");
   command->add_option("--threads", options.threads, "Threads, each with a block of its own")
