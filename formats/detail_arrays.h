@@ -1,8 +1,10 @@
-// The arrays of a detail-increment model as its file holds them: 32-bit words, small where they can be,
-// so that their high bytes are mostly zero and compress away (docs/DETAIL_FORMAT.md has the rules).
+// The arrays of a detail-increment model as its file holds them: 32-bit words, small where they
+// can be, so that their high bytes are mostly zero and compress away (docs/DETAIL_FORMAT.md has
+// the rules).
 //
-// Guarantees: decoding what was encoded gives the same model, bit for bit; decoding anything else gives
-// a model without fault (detail_check.h) or an Error, and allocates in proportion to the words given.
+// Guarantees: decoding what was encoded gives the same model, bit for bit; decoding anything else
+// gives a model without fault (detail_check.h) or an Error, and allocates in proportion to the
+// words given.
 #pragma once
 
 #include <array>

@@ -1,7 +1,8 @@
-// Whether a detail-increment model is whole: what its file's reader refuses and its writer requires.
+// Whether a detail-increment model is whole: what its file's reader refuses and its writer
+// requires.
 //
-// Tells of every index, size and number by itself. Not of whether the triangles are a surface and each
-// split can be: stages/detail_block.h finds that out on its walk.
+// Tells of every index, size and number by itself. Not of whether the triangles are a surface and
+// each split can be: stages/detail_block.h finds that out on its walk.
 #pragma once
 
 #include <cstdint>
@@ -34,8 +35,8 @@ struct DetailSummary {
 // REQUIRES: no block has more splits than points.
 DetailSummary summary_of(const DetailModel& model);
 
-// No block; more points or half-edges than 32 bits number; an interval of 0; a frame that is not finite
-// or whose steps are not positive.
+// No block; more points or half-edges than 32 bits number; an interval of 0; a frame that is not
+// finite or whose steps are not positive.
 std::optional<Error> fault_of(const DetailSummary& summary);
 
 // Indices of the coarsest mesh and of the splits. REQUIRES: no more splits than points.

@@ -1,11 +1,11 @@
 // Where a split's point is expected, from what the splits before it tell: what the file of a
 // detail-increment model holds is the difference.
 //
-// The split's half-edge belongs to a triangle, and the expected point is the mean of the three points that triangle
-// had when it was made. Its corners may have moved on to other points since; which, only the walk through all
-// levels knows, but they are near. So no walk is needed to read a file.
-// When a split makes its triangles (v, r, u) and (v, u, l), v, r and l are taken from the half-edge's
-// triangle in the same way.
+// The split's half-edge belongs to a triangle, and the expected point is the mean of the three
+// points that triangle had when it was made. Its corners may have moved on to other points since;
+// which, only the walk through all levels knows, but they are near. So no walk is needed to read
+// a file. When a split makes its triangles (v, r, u) and (v, u, l), v, r and l are taken from the
+// half-edge's triangle in the same way.
 #pragma once
 
 #include <cstddef>

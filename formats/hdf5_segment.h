@@ -1,12 +1,12 @@
 // What all HDF5 files of ours have in common (lattice_segment.h, border_segment.h, detail_file.h).
 //
 // A file is built in memory, so that only our own code meets a full disk, and ends with a seal
-// (formats/file_seal.h), which HDF5 ignores. Root attributes `format_version` (int32) and a text that
-// tells what it is: of a store's file `scheme` ("geodetic" or "mercator"); chunked datasets, and small
-// ones of numbers beside them. A store's file has one chunked dataset, whose chunks are outside the
-// seal and carry hashes of their own. HDF5's ids are 64-bit integers here, so that its headers stay
-// out of ours. Different objects may be used from different threads at once where HDF5 was built
-// thread-safe.
+// (formats/file_seal.h), which HDF5 ignores. Root attributes `format_version` (int32) and a text
+// that tells what it is: of a store's file `scheme` ("geodetic" or "mercator"); chunked datasets,
+// and small ones of numbers beside them. A store's file has one chunked dataset, whose chunks are
+// outside the seal and carry hashes of their own. HDF5's ids are 64-bit integers here, so that
+// its headers stay out of ours. Different objects may be used from different threads at once
+// where HDF5 was built thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +25,8 @@ namespace qmpipe {
 
 const char* segment_scheme_name(const TilingScheme& scheme);
 
-// What a file says it is, and the words for one that says something else: "its `called` is mercator,
-// `wanted_by` is geodetic; `remedy`".
+// What a file says it is, and the words for one that says something else: "its `called` is
+// mercator, `wanted_by` is geodetic; `remedy`".
 struct SegmentIdentity {
   std::int32_t format_version = 0;
   const char* attribute = "";

@@ -1,6 +1,6 @@
-// Arrays of 32-bit words to compressed chunks and back, in the bytes that HDF5's filters would make:
-// its byte shuffle (filter 2), then one zstd frame (registered filter 32015).
-// Different threads may use these functions at once.
+// Arrays of 32-bit words to compressed chunks and back, in the bytes that HDF5's filters would
+// make: its byte shuffle (filter 2), then one zstd frame (registered filter 32015). Different
+// threads may use these functions at once.
 #pragma once
 
 #include <cstddef>

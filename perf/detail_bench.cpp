@@ -1,14 +1,18 @@
-// How fast is the detail-increment model on one core? Collapses with their record, single steps between
-// levels an interval of 100 apart, and walks from the coarsest level to the finest.
+// How fast is the detail-increment model on one core? Collapses with their record, single steps
+// between levels an interval of 100 apart, walks from the coarsest level to the finest, and its
+// file, whose size is a counter: against raw increments, the fields of Table 1 of the paper.
 #include <benchmark/benchmark.h>
 
+#include <filesystem>
 #include <vector>
 
+#include "formats/detail_file.h"
 #include "perf/bench_terrain.h"
 #include "perf/register_benchmarks.h"
 #include "stages/detail_block.h"
 #include "stages/detail_increment.h"
 #include "stages/synth_terrain.h"
+#include "tests/temporary_folder.h"
 
 namespace qmpipe::perf {
 namespace {
@@ -104,6 +108,38 @@ void walk_by_increments(benchmark::State& state) {
   state.counters["changed/s"] = benchmark::Counter(2 * static_cast<double>(changed),
                                                    benchmark::Counter::kIsIterationInvariantRate);
 }
+DetailModel model() {
+  DetailModel model;
+  model.frame = grid().frame;
+  model.interval = kInterval;
+  model.blocks = {block()};
+  return model;
+}
+
+void write_file(benchmark::State& state) {
+  const testing::TemporaryFolder folder;
+  const DetailModel written = model();
+  for (auto _ : state) write_detail_file(folder.path() / "model.h5", written);
+  const auto bytes = static_cast<double>(std::filesystem::file_size(folder.path() / "model.h5"));
+  const auto splits = static_cast<double>(block().levels());
+  double raw_bytes = 0;
+  for (const DetailSplit& split : block().splits) raw_bytes += 40 + 28 * split.fan;
+  state.counters["bytes/split"] = bytes / splits;
+  state.counters["bytes/triangle"] =
+      bytes / static_cast<double>(block().triangles_at(block().levels()));
+  state.counters["raw_bytes/split"] = raw_bytes / splits;
+}
+
+void read_file(benchmark::State& state) {
+  const testing::TemporaryFolder folder;
+  write_detail_file(folder.path() / "model.h5", model());
+  for (auto _ : state) {
+    if (!read_detail_file(folder.path() / "model.h5").ok()) state.SkipWithError("damaged");
+  }
+  state.counters["splits/s"] = benchmark::Counter(static_cast<double>(block().levels()),
+                                                  benchmark::Counter::kIsIterationInvariantRate);
+}
+
 }  // namespace
 
 void register_benchmarks() {
@@ -113,6 +149,8 @@ void register_benchmarks() {
   add("collapse", collapse);
   add("walk/splits", walk_by_splits);
   add("walk/increments_of_100", walk_by_increments);
+  add("file/write", write_file);
+  add("file/read", read_file);
 }
 
 }  // namespace qmpipe::perf

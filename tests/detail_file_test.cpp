@@ -87,7 +87,8 @@ TEST(DetailFile, SameModelSameBytesAndAnOlderFileIsReplaced) {
   EXPECT_EQ(bytes_of(folder.path() / "a.h5"), bytes_of(folder.path() / "b.h5"));
 }
 
-// Table 1 of the paper: 8 bytes of fields, 16 for each of two triangles deleted, 28 for each replaced.
+// Table 1 of the paper: 8 bytes of fields, 16 for each of two triangles deleted, 28 for each
+// replaced.
 TEST(DetailFile, TakesATenthOfTheRawIncrementsOfARealBlock) {
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "model.h5";

@@ -1,4 +1,4 @@
-// Segments through HDF5's own filter pipeline, with zstd registered as the plugin would: what h5py
+// Our files through HDF5's own filter pipeline, with zstd registered as the plugin would: what h5py
 // and others get.
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -8,9 +8,12 @@
 #include <cstdlib>
 #include <vector>
 
+#include "formats/detail_arrays.h"
+#include "formats/detail_file.h"
 #include "formats/hdf5_handle.h"
 #include "formats/segment_files.h"
 #include "tests/random_borders.h"
+#include "tests/random_detail_model.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {
@@ -46,10 +49,14 @@ struct ReadRecord {
   std::array<std::uint8_t, kMaskBytes> mask;
 };
 
-std::vector<ReadRecord> read_records(const std::filesystem::path& path, std::size_t count) {
+void register_zstd() {
   const H5Z_class2_t filter = {H5Z_CLASS_T_VERS, kZstdFilter, 1,       1,
                                "zstd",           nullptr,     nullptr, zstd_filter};
   EXPECT_GE(H5Zregister(&filter), 0);
+}
+
+std::vector<ReadRecord> read_records(const std::filesystem::path& path, std::size_t count) {
+  register_zstd();
   const hsize_t mask_bytes = kMaskBytes;
   const Hdf5Handle mask(H5Tarray_create2(H5T_NATIVE_UINT8, 1, &mask_bytes), H5Tclose);
   const Hdf5Handle type(H5Tcreate(H5T_COMPOUND, sizeof(ReadRecord)), H5Tclose);
@@ -86,6 +93,32 @@ TEST(Hdf5Filters, ReadEveryFieldOfEveryBorder) {
       const unsigned byte = record.mask[static_cast<std::size_t>(k / 8)];
       ASSERT_EQ((byte >> (k % 8) & 1U) != 0, mask.test(k)) << "post " << k << " of border " << n;
     }
+  }
+}
+
+TEST(Hdf5Filters, ReadEveryWordOfADetailFile) {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "model.h5";
+  std::mt19937_64 random(7);
+  DetailModel model;
+  model.blocks = {testing::random_detail_block(random, 50, 60, 70000)};  // two chunks
+  write_detail_file(path, model);
+  register_zstd();
+  const DetailArrays arrays = encode_detail(model);
+  const Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  for (std::size_t k = 0; k < kDetailArrayCount; ++k) {
+    SCOPED_TRACE(kDetailArrayNames[k]);
+    if (arrays[k].empty()) {
+      ASSERT_EQ(H5Lexists(file.id(), kDetailArrayNames[k], H5P_DEFAULT), 0);
+      continue;
+    }
+    const Hdf5Handle data(H5Dopen2(file.id(), kDetailArrayNames[k], H5P_DEFAULT), H5Dclose);
+    const Hdf5Handle space(H5Dget_space(data.id()), H5Sclose);
+    ASSERT_EQ(H5Sget_simple_extent_npoints(space.id()), std::ssize(arrays[k]));
+    std::vector<std::uint32_t> words(arrays[k].size());
+    ASSERT_GE(H5Dread(data.id(), H5T_NATIVE_UINT32, H5S_ALL, H5S_ALL, H5P_DEFAULT, words.data()),
+              0);
+    EXPECT_EQ(words, arrays[k]);
   }
 }
 

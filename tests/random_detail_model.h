@@ -1,5 +1,5 @@
-// Random models for the tests of the detail-increment model's file: without fault (detail_check.h), but
-// without any meaning as terrain.
+// Random models for the tests of the detail-increment model's file: without fault
+// (detail_check.h), but without any meaning as terrain.
 #pragma once
 
 #include <algorithm>

@@ -1,7 +1,7 @@
-// Any bytes as the arrays of a detail-increment model: decode_detail() neither throws nor over-reads, and
-// what it accepts encodes to the same arrays. The first byte says how many blocks there are and whether
-// the words come through unpack_words(), then come three bytes a block (coarse points, coarse
-// triangles, splits), one for the seams, and the words, 0 where they end.
+// Any bytes as the arrays of a detail-increment model: decode_detail() neither throws nor
+// over-reads, and what it accepts encodes to the same arrays. The first byte says how many blocks
+// there are and whether the words come through unpack_words(), then come three bytes a block
+// (coarse points, coarse triangles, splits), one for the seams, and the words, 0 where they end.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
