@@ -163,7 +163,12 @@ void add_choices(CLI::App& command, ExtractArguments& arguments) {
       ->delimiter(',')
       ->expected(3)
       ->type_name("X,Y,Z");
-  DetailView& view = arguments.view;
+  add_view_options(command, arguments.view);
+}
+
+}  // namespace
+
+void add_view_options(CLI::App& command, DetailView& view) {
   command.add_option("--fov", view.fov_deg, "Vertical field of view, degrees")
       ->check(CLI::Range(0.1, 179.0))
       ->capture_default_str()
@@ -177,8 +182,6 @@ void add_choices(CLI::App& command, ExtractArguments& arguments) {
       ->capture_default_str()
       ->type_name("P");
 }
-
-}  // namespace
 
 void register_detail_extract(CLI::App& detail, std::function<int()>& action) {
   const auto arguments = std::make_shared<ExtractArguments>();

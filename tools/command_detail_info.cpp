@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "formats/file_bytes.h"
+#include "pipeline/detail_chart.h"
 #include "pipeline/detail_extract.h"
 #include "pipeline/detail_verify.h"
 #include "tools/detail_commands.h"
@@ -49,6 +51,8 @@ int run_verify(const VerifyArguments& arguments) {
 
 struct InfoArguments {
   std::string path;
+  std::string chart;
+  DetailView view;
   bool json = false;
 };
 
@@ -81,6 +85,11 @@ void print_info(const InfoArguments& arguments, const DetailModel& model) {
 
 int run_info(const InfoArguments& arguments) {
   const DetailModel model = load_model(arguments.path);
+  if (!arguments.chart.empty()) {
+    const std::string page = detail_chart_page(model, arguments.view, arguments.path);
+    write_file_atomically(arguments.chart,
+                          {reinterpret_cast<const std::uint8_t*>(page.data()), page.size()});
+  }
   if (!arguments.json) {
     print_info(arguments, model);
     return 0;
@@ -135,8 +144,16 @@ void register_detail_info(CLI::App& detail, std::function<int()>& action) {
       "svo: the smallest visible object of a level, metres.\n"
       "\n"
       "Example:\n"
-      "  qmpipe detail info terrain.h5 --json");
+      "  qmpipe detail info terrain.h5 --json\n"
+      "  qmpipe detail info terrain.h5 --chart terrain.html");
   command->add_option("FILE", arguments->path, "The model")->required();
+  command
+      ->add_option(
+          "--chart", arguments->chart,
+          "Page to write with charts of triangles, simplifications and distance against the "
+          "threshold")
+      ->type_name("HTML");
+  add_view_options(*command, arguments->view);
   command->add_flag("--json", arguments->json, "Write JSON");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_info(*arguments); }; });
