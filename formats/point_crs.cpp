@@ -2,6 +2,7 @@
 
 #include <cpl_conv.h>
 #include <cpl_vsi.h>
+#include <fmt/format.h>
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>
 
@@ -97,7 +98,8 @@ std::vector<std::uint8_t> tiff_with(const LasCrs& crs) {
 
 std::string crs_in_keys(const std::string& path, const LasCrs& crs, const GdalSession& session) {
   std::vector<std::uint8_t> bytes = tiff_with(crs);
-  const std::string name = "/vsimem/" + CPLString().Printf("qmpipe-keys-%p", bytes.data()) + ".tif";
+  const std::string name =
+      fmt::format("/vsimem/qmpipe-keys-{}.tif", static_cast<const void*>(bytes.data()));
   VSIFCloseL(VSIFileFromMemBuffer(name.c_str(), bytes.data(), bytes.size(), FALSE));
   // Or a CRS of GeoTIFF 1.0 loses its heights.
   CPLConfigOptionSetter compound("GTIFF_REPORT_COMPD_CS", "YES", false);
