@@ -122,6 +122,16 @@ TEST(PointCloud, GeoKeysMayDefineAProjectionOfTheirOwn) {
   EXPECT_EQ(cloud.units_m[0], 1);
 }
 
+TEST(PointCloud, KeysThatNameOnlyAUnitGiveTheUnitAndNoCrs) {
+  LasFixture fixture = corners();
+  fixture.geo_keys = {1, 1, 0, 3, 1024, 0, 1, 1, 3072, 0, 1, 32767, 3076, 0, 1, 9002};
+  const PointCloud cloud = read_las(fixture);
+  EXPECT_EQ(cloud.units_m, (std::array{0.3048, 0.3048, 0.3048}));
+  EXPECT_EQ(cloud.crs_wkt, "");
+  EXPECT_THAT(cloud.assumptions,
+              ElementsAre(HasSubstr("no CRS, but a unit"), HasSubstr("nothing about heights")));
+}
+
 TEST(PointCloud, TheUsersCrsGoesBeforeTheFiles) {
   LasFixture fixture = corners();
   fixture.wkt = "no CRS at all";
