@@ -73,6 +73,14 @@ bool begins_like_text(const fs::path& path) {
   });
 }
 
+// The rasters among the texts.
+bool begins_like_ascii_grid(const fs::path& path) {
+  constexpr std::string_view kFirstWord = "ncols";
+  std::vector<std::uint8_t> bytes = first_bytes(path, kFirstWord.size());
+  for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(std::tolower(byte));
+  return std::equal(bytes.begin(), bytes.end(), kFirstWord.begin(), kFirstWord.end());
+}
+
 ByteSource source_of(const fs::path& path) {
   std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
@@ -268,8 +276,8 @@ PointCloud read_text(const fs::path& path, const PointReadOptions& options) {
 
 bool is_point_file(const fs::path& path) {
   const std::string extension = extension_of(path);
-  return extension == ".las" || extension == ".laz" || is_text_name(extension) ||
-         begins_like_las(path);
+  if (is_text_name(extension)) return !begins_like_ascii_grid(path);
+  return extension == ".las" || extension == ".laz" || begins_like_las(path);
 }
 
 PointCloud read_point_cloud(const fs::path& path, const PointReadOptions& options) {

@@ -55,8 +55,8 @@ struct PointCloud {
   std::vector<std::string> assumptions;
 };
 
-// Does the name's extension or the file's beginning say that points are in it? .las .laz .xyz .csv
-// .txt, or LASF. Other files may be rasters.
+// Does the name's extension or the file's beginning say that points are in it? .las .laz, LASF, and .xyz
+// .csv .txt unless it is an ASCII grid ("ncols"). Other files may be rasters.
 bool is_point_file(const std::filesystem::path& path);
 
 // By the extension, else by the first bytes: LASF, or text. Throws IoError, with the remedy, for a

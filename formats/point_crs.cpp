@@ -2,16 +2,19 @@
 
 #include <cpl_conv.h>
 #include <cpl_vsi.h>
+#include <fmt/format.h>
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "formats/errors.h"
 #include "formats/gdal_session.h"
+#include "formats/height_unit.h"
 #include "formats/little_endian.h"
 
 namespace qmpipe {
@@ -97,7 +100,8 @@ std::vector<std::uint8_t> tiff_with(const LasCrs& crs) {
 
 std::string crs_in_keys(const std::string& path, const LasCrs& crs, const GdalSession& session) {
   std::vector<std::uint8_t> bytes = tiff_with(crs);
-  const std::string name = "/vsimem/" + CPLString().Printf("qmpipe-keys-%p", bytes.data()) + ".tif";
+  const std::string name =
+      fmt::format("/vsimem/qmpipe-keys-{}.tif", static_cast<const void*>(bytes.data()));
   VSIFCloseL(VSIFileFromMemBuffer(name.c_str(), bytes.data(), bytes.size(), FALSE));
   // Or a CRS of GeoTIFF 1.0 loses its heights.
   CPLConfigOptionSetter compound("GTIFF_REPORT_COMPD_CS", "YES", false);
@@ -118,6 +122,26 @@ std::string crs_in_keys(const std::string& path, const LasCrs& crs, const GdalSe
                   session.cause("they name no CRS that GDAL knows"), kRemedy);
   }
   return wkt;
+}
+
+// Of x and y, as a key of its own says; none where it is no foot and no metre.
+std::optional<double> metres_per_unit_in_keys(const LasCrs& crs) {
+  constexpr std::uint16_t kLinearUnits = 3076;
+  // Rows of four: key, place of its value (0: here), count, value.
+  for (std::size_t k = 4; k + 3 < crs.geo_keys.size(); k += 4) {
+    if (crs.geo_keys[k] != kLinearUnits || crs.geo_keys[k + 1] != 0) continue;
+    switch (crs.geo_keys[k + 3]) {
+      case 9001:
+        return 1;
+      case 9002:
+        return metres_per_unit("ft");
+      case 9003:
+        return metres_per_unit("us-ft");
+      default:
+        return std::nullopt;
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -141,9 +165,18 @@ RasterCrs crs_of_points(const std::string& path, const LasCrs& crs,
                     kRemedy);
     }
     own.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
-    if (!wkt.empty()) dataset->SetSpatialRef(&own);
+    // What GDAL makes of keys that name no projection is a plane in metres, whatever their unit.
+    const bool names_none = wkt.empty() || (crs.wkt.empty() && own.IsLocal() != 0);
+    if (!names_none) dataset->SetSpatialRef(&own);
   }
-  return crs_of(*dataset, path, path, override_text, CrsNeed::kOptional);
+  RasterCrs found = crs_of(*dataset, path, path, override_text, CrsNeed::kOptional);
+  if (const std::optional<double> unit_m = metres_per_unit_in_keys(crs);
+      unit_m && found.text.wkt.empty()) {
+    found.metres_per_unit = *unit_m;
+    found.assumptions = {
+        fmt::format("the file names no CRS, but a unit for its coordinates: {:g} m", *unit_m)};
+  }
+  return found;
 }
 
 double metres_per_height_unit(const RasterCrs& crs) {

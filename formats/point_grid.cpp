@@ -235,12 +235,14 @@ SquareThinner::SquareThinner(RawPoints& points, const std::array<double, 2>& sid
 }
 
 std::size_t SquareThinner::HashSquare::operator()(const Square& square) const {
-  constexpr std::uint64_t kOdd = 0x9E3779B97F4A7C15;
-  // Adding 0 takes the sign from -0, which equals 0.
-  const std::uint64_t column = std::bit_cast<std::uint64_t>(square.column + 0.0) * kOdd;
-  const std::uint64_t row = std::bit_cast<std::uint64_t>(square.row + 0.0);
-  const std::uint64_t mixed = ((column ^ (column >> 32U)) + row) * kOdd;
-  return static_cast<std::size_t>(mixed ^ (mixed >> 32U));
+  // Small numbers differ in a double's upper bits only, so these are brought down before each product.
+  const auto mix = [](std::uint64_t state, double number) {
+    // Adding 0 takes the sign from -0, which equals 0.
+    const auto bits = std::bit_cast<std::uint64_t>(number + 0.0);
+    state = (state ^ bits ^ (bits >> 32U)) * 0x9E3779B97F4A7C15ULL;
+    return state ^ (state >> 32U);
+  };
+  return static_cast<std::size_t>(mix(mix(0, square.column), square.row));
 }
 
 std::array<double, 2> SquareThinner::from_centre(const PointPlace& value, Square& square) const {
