@@ -24,9 +24,7 @@ constexpr const char* kStyle =
     ".key{display:inline-block;width:.8em;height:.8em;margin-right:.5em;border-radius:2px}"
     ".charts,.tiles{display:flex;flex-wrap:wrap;gap:1em}figure{margin:0 0 1em}"
     "figcaption{font-size:14px;max-width:512px}"
-    "svg text{font:11px sans-serif;fill:#333}svg .title{font-size:13px;text-anchor:middle}"
-    "svg .label{text-anchor:middle}svg .value{text-anchor:end}"
-    "svg .grid{stroke:#ddd;stroke-width:1}svg.tile{max-width:100%;height:auto}";
+    "svg.tile{max-width:100%;height:auto}";
 
 struct Rows {
   const ComparedMethod* method;
@@ -211,7 +209,7 @@ std::string comparison_page(const Comparison& comparison) {
       "methods "
       "on {0}</title><style>{1}</style></head><body><h1>Simplification methods on {0}</h1>"
       "<p>Made by qmpipe {2} compare, after Campos et al. 2020, section 5.</p>\n",
-      inputs, kStyle, kProgramVersion);
+      inputs, std::string(kStyle) + kChartStyle, kProgramVersion);
   html += run_times_section(comparison, all) + zooms_section(all);
   if (comparison.tile) {
     html += single_tile_section(comparison, all) + pictures_section(comparison);

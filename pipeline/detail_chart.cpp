@@ -95,10 +95,10 @@ std::string detail_chart_page(const DetailModel& model, const DetailView& view,
                               const std::string& title) {
   std::string page = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n"
-      "<style>body {{ font: 15px/1.5 sans-serif; max-width: 60em; margin: 2em auto; }}</style>\n"
+      "<style>body{{font:15px/1.5 sans-serif;max-width:60em;margin:2em auto}}{4}</style>\n"
       "</head><body><h1>{0}</h1>\n<p>A field of view of {1:g} degrees, a screen {2:g} pixels high, "
       "a smallest visible object {3:g} pixels long.</p>\n",
-      escaped(title), view.fov_deg, view.screen_height, view.pixels);
+      escaped(title), view.fov_deg, view.screen_height, view.pixels, kChartStyle);
   page +=
       chart_svg(chart_of(model, view, "Triangles", "triangles of the block",
                          [](const DetailState& s) { return static_cast<double>(s.triangles); }));

@@ -28,6 +28,12 @@ struct Chart {
   std::vector<ChartLine> lines;
 };
 
+// What a page with charts has among its styles.
+inline constexpr const char* kChartStyle =
+    "svg text{font:11px sans-serif;fill:#333}svg .title{font-size:13px;text-anchor:middle}"
+    "svg .label{text-anchor:middle}svg .value{text-anchor:end}"
+    "svg .grid{stroke:#ddd;stroke-width:1}";
+
 // Line k has colour_of(k). Points that a logarithmic axis cannot show are left out.
 std::string chart_svg(const Chart& chart);
 std::string colour_of(std::size_t line);

@@ -29,7 +29,7 @@ constexpr const char* kFooter =
     "\n"
     "Examples:\n"
     "  qmpipe detail build dem.tif -o terrain.h5\n"
-    "  qmpipe detail build survey.las -o terrain.h5 --classes ground --thin 0.5\n"
+    "  qmpipe detail build survey.las -o terrain.h5 --class ground --thin 0.5\n"
     "  qmpipe detail build dem.tif -o terrain.h5 --blocks 64 --keep 5% --interval 1000\n"
     "Exit codes: 0 written, 1 failed, 2 wrong usage, 130 interrupted.";
 
@@ -163,7 +163,7 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
           "whole metres, else 0.01)")
       ->type_name("M");
   command
-      ->add_option("--classes", arguments->classes,
+      ->add_option("--class", arguments->classes,
                    "Classes of a LAS file to keep: ground, or numbers between commas (default: all "
                    "but noise)")
       ->type_name("LIST");
