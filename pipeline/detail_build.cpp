@@ -86,7 +86,9 @@ struct Input {
 
 void note_assumptions(const std::string& path, const std::vector<std::string>& assumptions,
                       Progress& progress) {
-  for (const std::string& assumption : assumptions) progress.note(path + ": " + assumption);
+  for (const std::string& assumption : assumptions) {
+    progress.note(fmt::format("{}: {}", path, assumption));
+  }
 }
 
 Input read_dem_input(const DetailBuildOptions& options, Progress& progress,
@@ -150,8 +152,9 @@ DetailModel simplify_base(DetailBase base, const DetailFrame& frame,
                           const DetailBuildOptions& options, Progress& progress,
                           DetailBuildReport& report) {
   const auto target = [&](const BaseBlock& block) {
-    const auto triangles = static_cast<double>(block.triangles.size() / 3);
-    return static_cast<std::int64_t>(std::ceil(options.keep_share * triangles));
+    const std::size_t triangles = block.triangles.size() / 3;
+    return static_cast<std::int64_t>(
+        std::ceil(options.keep_share * static_cast<double>(triangles)));
   };
   std::int64_t to_do = 0;
   for (const BaseBlock& block : base.blocks) {

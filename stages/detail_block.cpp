@@ -25,10 +25,11 @@ class Renumbering {
       for (std::size_t k = 0; k < 3; ++k) half_edge_[e + k] = count_++;
     }
     coarse_half_edges_ = count_;
-    for (auto c = collapses.rbegin(); c != collapses.rend(); ++c) {
+    for (std::size_t k = collapses.size(); k-- > 0;) {
+      const DetailCollapse& c = collapses[k];
       // The first added triangle is (v, r, u): the half-edge from u to v is its last.
-      number_from(CollapseMesh::next(c->half_edge));
-      number_from(c->twin);
+      number_from(CollapseMesh::next(c.half_edge));
+      number_from(c.twin);
     }
   }
 
@@ -60,8 +61,9 @@ std::vector<std::uint32_t> point_order(std::size_t points,
   for (std::size_t v = 0; v < points; ++v) {
     if (!is_removed[v]) order.push_back(u32(v));
   }
-  for (auto c = collapses.rbegin(); c != collapses.rend(); ++c) {
-    order.push_back(static_cast<std::uint32_t>(c->removed));
+  for (std::size_t k = collapses.size(); k-- > 0;) {
+    const DetailCollapse& c = collapses[k];
+    order.push_back(static_cast<std::uint32_t>(c.removed));
   }
   return order;
 }
@@ -71,8 +73,9 @@ std::vector<std::uint32_t> last_vertices(std::size_t points,
                                          std::span<const DetailCollapse> collapses) {
   std::vector<std::uint32_t> last(points);
   for (std::size_t v = 0; v < points; ++v) last[v] = u32(v);
-  for (auto c = collapses.rbegin(); c != collapses.rend(); ++c) {
-    last[at(c->removed)] = last[at(c->kept)];
+  for (std::size_t k = collapses.size(); k-- > 0;) {
+    const DetailCollapse& c = collapses[k];
+    last[at(c.removed)] = last[at(c.kept)];
   }
   return last;
 }
@@ -112,9 +115,10 @@ OrderedBlock make_detail_block(std::span<const DetailPoint> points,
     if (number.is_coarse(e)) block.coarse_triangles.push_back(place[last[triangles[e]]]);
   }
   block.splits.reserve(record.collapses.size());
-  for (auto c = record.collapses.rbegin(); c != record.collapses.rend(); ++c) {
+  for (std::size_t k = record.collapses.size(); k-- > 0;) {
+    const DetailCollapse& c = record.collapses[k];
     block.splits.push_back(
-        {.half_edge = number[c->first_of_fan], .fan = static_cast<std::uint32_t>(c->fan)});
+        {.half_edge = number[c.first_of_fan], .fan = static_cast<std::uint32_t>(c.fan)});
   }
   block.svo_m = svo_of(record);
   return result;

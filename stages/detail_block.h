@@ -38,7 +38,7 @@ class DetailWalk {
   template <class Touched>
   std::optional<Error> refine(const Touched& touched) {
     auto fan = fan_of_next_split();
-    if (!fan) return std::move(fan.error());
+    if (!fan) return fan.error();
     for (std::uint32_t e = fan->first;; e = twins_[previous(e)]) {
       touched(e / 3);
       if (e == fan->last) break;

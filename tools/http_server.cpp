@@ -82,7 +82,7 @@ struct HttpServer::Impl {
 };
 
 HttpServer::HttpServer(const ListenOptions& options, Handler handler)
-    : impl_(std::make_unique<Impl>()) {
+    : impl_(std::make_unique<Impl>()), port_(options.port) {
   httplib::Server& server = impl_->server;
   const auto threads = static_cast<std::size_t>(options.threads);
   server.new_task_queue = [threads] { return new httplib::ThreadPool(threads); };
@@ -112,7 +112,6 @@ HttpServer::HttpServer(const ListenOptions& options, Handler handler)
                                   std::exception_ptr error) {
     write_reply(error_reply(500, words_for(std::move(error))), response);
   });
-  port_ = options.port;
   errno = 0;
   if (options.port == 0) {
     port_ = server.bind_to_any_port(options.host);
