@@ -117,7 +117,7 @@ EncodedBorderSegment encode_border_segment(const std::filesystem::path& path,
   std::vector<std::int32_t> firsts;
   std::vector<std::int32_t> lasts;
   std::vector<std::uint64_t> hashes;
-  Hdf5SegmentWriter writer(path, kBorderSegmentVersion, scheme);
+  Hdf5SegmentWriter writer(path, store_identity(kBorderSegmentVersion, scheme));
   const Hdf5Handle type = make_record_type(path);
   writer.create_chunked("borders", type.id(), {borders.size()}, {records}, type.id(), nullptr);
   for (std::size_t row = 0; row < borders.size(); row += records) {
@@ -148,7 +148,7 @@ EncodedBorderSegment encode_border_segment(const std::filesystem::path& path,
 Result<std::vector<BorderChunk>> read_border_segment(const std::filesystem::path& path,
                                                      const TilingScheme& scheme,
                                                      std::int32_t max_zoom) {
-  const auto file = Hdf5SegmentReader::open(path, kBorderSegmentVersion, scheme);
+  const auto file = Hdf5SegmentReader::open(path, store_identity(kBorderSegmentVersion, scheme));
   if (!file) return file.error();
   auto chunks = locate_chunks(*file);
   if (!chunks) return chunks;

@@ -1,11 +1,12 @@
-// What the HDF5 files of all stores have in common (lattice_segment.h, border_segment.h).
+// What all HDF5 files of ours have in common (lattice_segment.h, border_segment.h, detail_file.h).
 //
 // A file is built in memory, so that only our own code meets a full disk, and ends with a seal
-// (formats/file_seal.h), which HDF5 ignores. Root attributes `format_version` (int32) and `scheme`
-// ("geodetic" or "mercator"); one chunked dataset, whose chunks are outside the seal and carry
-// hashes of their own; small datasets of numbers beside it. HDF5's ids are 64-bit integers here, so
-// that its headers stay out of ours. Different objects may be used from different threads at once
-// where HDF5 was built thread-safe.
+// (formats/file_seal.h), which HDF5 ignores. Root attributes `format_version` (int32) and a text that
+// tells what it is: of a store's file `scheme` ("geodetic" or "mercator"); chunked datasets, and small
+// ones of numbers beside them. A store's file has one chunked dataset, whose chunks are outside the
+// seal and carry hashes of their own. HDF5's ids are 64-bit integers here, so that its headers stay
+// out of ours. Different objects may be used from different threads at once where HDF5 was built
+// thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -24,6 +25,18 @@ namespace qmpipe {
 
 const char* segment_scheme_name(const TilingScheme& scheme);
 
+// What a file says it is, and the words for one that says something else: "its `called` is mercator,
+// `wanted_by` is geodetic; `remedy`".
+struct SegmentIdentity {
+  std::int32_t format_version = 0;
+  const char* attribute = "";
+  std::string value;  // 1 to 64 bytes
+  const char* called = "";
+  const char* wanted_by = "";
+  const char* remedy = "";
+};
+SegmentIdentity store_identity(std::int32_t format_version, const TilingScheme& scheme);
+
 struct LocatedChunk {
   std::uint64_t row = 0;  // the chunk's first, along the first dimension
   ByteRange range;
@@ -38,36 +51,39 @@ class Hdf5SegmentWriter {
   };
 
   // No other thread may write under the same path.
-  Hdf5SegmentWriter(std::filesystem::path path, std::int32_t format_version,
-                    const TilingScheme& scheme);
+  Hdf5SegmentWriter(std::filesystem::path path, const SegmentIdentity& identity);
+
+  // A root attribute. REQUIRES: text is not empty.
+  void write_text(const char* name, const std::string& text) const;
 
   // `type` and `fill` (null: zeros) are HDF5's; `fill_type` is the type of `fill` in memory. Bytes
-  // go through the shuffle filter and zstd (registered filter 32015). REQUIRES: called once, before
-  // the functions below.
+  // go through the shuffle filter and zstd (registered filter 32015).
   void create_chunked(const char* name, std::int64_t type, const std::vector<std::uint64_t>& shape,
                       const std::vector<std::uint64_t>& chunk_shape, std::int64_t fill_type,
                       const void* fill);
-  // `chunk` as the filters would have made it.
+  // To the last dataset made; `chunk` as the filters would have made it.
   void write_chunk(std::uint64_t row, std::span<const std::uint8_t> chunk);
-  // A dataset (n) or, with several columns, (n, columns). T: std::int32_t, std::uint8_t or
-  // std::uint64_t.
+  // A dataset (n) or, with several columns, (n, columns). T: std::int32_t, std::uint8_t,
+  // std::uint64_t or double.
   template <class T>
   void write_values(const char* name, std::size_t columns, const std::vector<T>& values);
+  // The chunks are outside the seal. REQUIRES: one chunked dataset.
   Finished finish();
+  // The whole file, its chunks under the seal as well.
+  std::vector<std::uint8_t> finish_whole();
 
  private:
   Hdf5Handle made(std::int64_t id, Hdf5Handle::Close close) const;
   void check(int status) const;
   [[noreturn]] void fail() const;
   Hdf5Handle create_file() const;
-  void write_attributes(std::int32_t format_version, const TilingScheme& scheme) const;
+  void write_version(std::int32_t format_version) const;
   std::vector<LocatedChunk> locate_chunks() const;
   std::vector<std::uint8_t> image() const;
 
   const std::filesystem::path path_;
   const Hdf5Handle file_;
-  std::optional<Hdf5Handle> chunked_;
-  std::size_t dimensions_ = 0;
+  std::vector<Hdf5Handle> chunked_;
 };
 
 struct ChunkedDataset {
@@ -80,14 +96,15 @@ struct ChunkedDataset {
 // Every Error names the file and the remedy.
 class Hdf5SegmentReader {
  public:
-  // Refuses a file whose seal is broken, that HDF5 cannot open, or that is of another version or
-  // scheme.
+  // Refuses a file whose seal is broken, that HDF5 cannot open, or that says it is something else.
   static Result<Hdf5SegmentReader> open(const std::filesystem::path& path,
-                                        std::int32_t format_version, const TilingScheme& scheme);
+                                        const SegmentIdentity& identity);
 
   Error refused(const std::string& cause) const;
   Error refused_shape(const std::string& name) const;
 
+  // A root attribute; empty when there is none. Refuses more than limit_bytes.
+  Result<std::string> text(const char* name, std::size_t limit_bytes) const;
   // All values of a dataset of shape (n) or, with several columns, (n, columns); 1 <= n <=
   // limit_rows. T as in Hdf5SegmentWriter.
   template <class T>
@@ -99,17 +116,17 @@ class Hdf5SegmentReader {
                                  std::size_t limit_bytes) const;
 
  private:
-  Hdf5SegmentReader(std::filesystem::path path, Hdf5Handle file)
-      : path_(std::move(path)), file_(std::move(file)) {}
+  Hdf5SegmentReader(std::filesystem::path path, Hdf5Handle file, const char* remedy)
+      : path_(std::move(path)), file_(std::move(file)), remedy_(remedy) {}
   Error refused_by_hdf5(const std::string& what) const;
   Result<std::int32_t> version_attribute() const;
-  Result<std::string> scheme_attribute() const;
-  std::optional<Error> check_header(std::int32_t format_version, const TilingScheme& scheme) const;
+  std::optional<Error> check_header(const SegmentIdentity& identity) const;
   std::optional<Error> read_shapes(const Hdf5Handle& data, const std::string& what,
                                    ChunkedDataset& dataset) const;
 
   std::filesystem::path path_;
   Hdf5Handle file_;
+  const char* remedy_;
 };
 
 }  // namespace qmpipe

@@ -5,17 +5,18 @@
 #include <type_traits>
 
 #include "formats/hdf5_segment.h"
-#include "formats/segment_files.h"
 
 namespace qmpipe {
 namespace {
 
 constexpr std::size_t kMostDimensions = 4;
+constexpr std::size_t kMostIdentityBytes = 64;
 
 template <class T>
 hid_t memory_type_of() {
   if constexpr (std::is_same_v<T, std::int32_t>) return H5T_NATIVE_INT32;
   if constexpr (std::is_same_v<T, std::uint8_t>) return H5T_NATIVE_UINT8;
+  if constexpr (std::is_same_v<T, double>) return H5T_NATIVE_DOUBLE;
   return H5T_NATIVE_UINT64;
 }
 
@@ -24,7 +25,7 @@ std::string dataset_named(const std::string& name) { return fmt::format("the dat
 }  // namespace
 
 Error Hdf5SegmentReader::refused(const std::string& cause) const {
-  return Error{fmt::format("{}: {}; {}", path_.string(), cause, kStartOver)};
+  return Error{fmt::format("{}: {}; {}", path_.string(), cause, remedy_)};
 }
 
 Error Hdf5SegmentReader::refused_shape(const std::string& name) const {
@@ -36,10 +37,9 @@ Error Hdf5SegmentReader::refused_by_hdf5(const std::string& what) const {
 }
 
 Result<Hdf5SegmentReader> Hdf5SegmentReader::open(const std::filesystem::path& path,
-                                                  std::int32_t format_version,
-                                                  const TilingScheme& scheme) {
+                                                  const SegmentIdentity& identity) {
   if (const auto error = check_seal(path)) {
-    return Error{fmt::format("{}; {}", error->message, kStartOver)};
+    return Error{fmt::format("{}; {}", error->message, identity.remedy)};
   }
   silence_hdf5();
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
@@ -48,11 +48,11 @@ Result<Hdf5SegmentReader> Hdf5SegmentReader::open(const std::filesystem::path& p
   Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.ok() ? access.id() : H5P_DEFAULT),
                   H5Fclose);
   if (!file.ok()) {
-    return Error{
-        fmt::format("{}: HDF5 cannot open it: {}; {}", path.string(), hdf5_cause(), kStartOver)};
+    return Error{fmt::format("{}: HDF5 cannot open it: {}; {}", path.string(), hdf5_cause(),
+                             identity.remedy)};
   }
-  Hdf5SegmentReader reader(path, std::move(file));
-  if (const auto error = reader.check_header(format_version, scheme)) return *error;
+  Hdf5SegmentReader reader(path, std::move(file), identity.remedy);
+  if (const auto error = reader.check_header(identity)) return *error;
   return reader;
 }
 
@@ -66,35 +66,36 @@ Result<std::int32_t> Hdf5SegmentReader::version_attribute() const {
   return version;
 }
 
-Result<std::string> Hdf5SegmentReader::scheme_attribute() const {
-  const Hdf5Handle attribute(H5Aopen(file_.id(), "scheme", H5P_DEFAULT), H5Aclose);
-  if (!attribute.ok()) return refused("it names no tiling scheme");
+Result<std::string> Hdf5SegmentReader::text(const char* name, std::size_t limit_bytes) const {
+  if (H5Aexists(file_.id(), name) == 0) return std::string();
+  const Hdf5Handle attribute(H5Aopen(file_.id(), name, H5P_DEFAULT), H5Aclose);
+  if (!attribute.ok()) return refused(fmt::format("its attribute `{}` cannot be read", name));
   const Hdf5Handle type(H5Aget_type(attribute.id()), H5Tclose);
   const hsize_t size_bytes = H5Aget_storage_size(attribute.id());
-  if (!type.ok() || H5Tget_class(type.id()) != H5T_STRING || size_bytes > 64 ||
+  if (!type.ok() || H5Tget_class(type.id()) != H5T_STRING || size_bytes > limit_bytes ||
       H5Tis_variable_str(type.id()) != 0) {
-    return refused("it names no tiling scheme");
+    return refused(fmt::format("its attribute `{}` is no text of ours", name));
   }
   std::string text(size_bytes, '\0');
   if (H5Aread(attribute.id(), type.id(), text.data()) < 0) {
-    return refused("it names no tiling scheme");
+    return refused(fmt::format("its attribute `{}` cannot be read", name));
   }
   return text;
 }
 
-std::optional<Error> Hdf5SegmentReader::check_header(std::int32_t format_version,
-                                                     const TilingScheme& scheme) const {
+std::optional<Error> Hdf5SegmentReader::check_header(const SegmentIdentity& identity) const {
   const auto version = version_attribute();
   if (!version) return version.error();
-  if (*version != format_version) {
-    return refused(
-        fmt::format("its format version is {}, this program reads {}", *version, format_version));
+  const auto value = text(identity.attribute, kMostIdentityBytes);
+  if (!value) return value.error();
+  if (value->empty()) return refused(fmt::format("it names no {}", identity.called));
+  if (*value != identity.value) {
+    return refused(fmt::format("its {} is {}, {} is {}", identity.called, *value,
+                               identity.wanted_by, identity.value));
   }
-  const auto name = scheme_attribute();
-  if (!name) return name.error();
-  if (*name != segment_scheme_name(scheme)) {
-    return refused(fmt::format("its tiling scheme is {}, the run's is {}", *name,
-                               segment_scheme_name(scheme)));
+  if (*version != identity.format_version) {
+    return refused(fmt::format("its format version is {}, this program reads {}", *version,
+                               identity.format_version));
   }
   return std::nullopt;
 }
@@ -125,6 +126,8 @@ template Result<std::vector<std::uint8_t>> Hdf5SegmentReader::values(const char*
                                                                      std::size_t) const;
 template Result<std::vector<std::uint64_t>> Hdf5SegmentReader::values(const char*, std::size_t,
                                                                       std::size_t) const;
+template Result<std::vector<double>> Hdf5SegmentReader::values(const char*, std::size_t,
+                                                               std::size_t) const;
 
 std::optional<Error> Hdf5SegmentReader::read_shapes(const Hdf5Handle& data, const std::string& what,
                                                     ChunkedDataset& dataset) const {

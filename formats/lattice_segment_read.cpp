@@ -33,7 +33,7 @@ Result<std::vector<ByteRange>> locate_blocks(const Hdf5SegmentReader& file, std:
 Result<std::vector<SegmentEntry>> read_lattice_segment(const std::filesystem::path& path,
                                                        const TilingScheme& scheme,
                                                        std::int32_t max_zoom) {
-  const auto file = Hdf5SegmentReader::open(path, kSegmentFormatVersion, scheme);
+  const auto file = Hdf5SegmentReader::open(path, store_identity(kSegmentFormatVersion, scheme));
   if (!file) return file.error();
   const auto keys = file->values<std::int32_t>("keys", 3, kMaxSegmentBlocks);
   if (!keys) return keys.error();

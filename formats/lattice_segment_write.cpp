@@ -27,7 +27,7 @@ EncodedSegment encode_lattice_segment(
   std::vector<std::int32_t> keys;
   std::vector<std::uint8_t> is_void;
   std::vector<std::uint64_t> hashes;
-  Hdf5SegmentWriter writer(path, kSegmentFormatVersion, scheme);
+  Hdf5SegmentWriter writer(path, store_identity(kSegmentFormatVersion, scheme));
   // So that a block without a chunk reads as void.
   const float fill_m = std::numeric_limits<float>::quiet_NaN();
   writer.create_chunked("blocks", H5T_IEEE_F32LE, {blocks.size(), kSide, kSide}, {1, kSide, kSide},
