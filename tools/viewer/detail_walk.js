@@ -255,7 +255,8 @@ export class DetailWalk {
     this.step(level, Infinity);
   }
 
-  // Ranges of half-edges in use that changed since this was last asked: calls visit(begin, end).
+  // Whole triangles in use among which are all that changed since this was last asked: calls
+  // visit(begin, end) with ranges of half-edges.
   takeChanges(visit) {
     const used = 3 * this.triangles;
     const pages = this.changed.length;
@@ -267,7 +268,8 @@ export class DetailWalk {
       const begin = page << DetailWalk.pageBits;
       if (begin >= used) break;
       while (page < pages && this.changed[page] === 1) this.changed[page++] = 0;
-      visit(begin, Math.min(page << DetailWalk.pageBits, used));
+      const end = page << DetailWalk.pageBits;
+      visit(begin - begin % 3, Math.min(end + 2 - (end + 2) % 3, used));
     }
   }
 }
