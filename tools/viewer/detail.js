@@ -28,6 +28,11 @@ function say(title, ...sentences) {
   }
 }
 
+function report(error) {
+  say('Nothing to show', error instanceof Plain ? error.message : `${error}`);
+  if (!(error instanceof Plain)) throw error;
+}
+
 function requireWebGl() {
   if (document.createElement('canvas').getContext('webgl2')) return;
   throw new Plain('This browser has no WebGL 2, which three.js draws with. Switch on hardware ' +
@@ -79,7 +84,7 @@ class Viewer {
     addEventListener('resize', () => this.fit());
     this.fit();
     this.look({ heading: number('heading', 15), pitch: number('pitch', -35),
-                range: number('range', 2 * this.radius) });
+                range: number('range', 1.5 * this.radius) });
   }
 
   fit() {
@@ -134,7 +139,15 @@ class Viewer {
   }
 
   frame(now) {
-    requestAnimationFrame((then) => this.frame(then));
+    try {
+      this.advance(now);
+      requestAnimationFrame((then) => this.frame(then));
+    } catch (error) {
+      report(error);
+    }
+  }
+
+  advance(now) {
     const start = performance.now();
     if (this.controls.update()) this.needsPicture = true;
     this.setTargets();
@@ -195,7 +208,8 @@ class Viewer {
       this.note(`block ${b + 1} of ${blocks.length} ...`);
     }
     const seams = await fetchPart('seams.bin');
-    this.detail.addSeams(decodeSeams(await seams.arrayBuffer(), this.description));
+    this.seams = decodeSeams(await seams.arrayBuffer(), this.description);
+    this.detail.addSeams(this.seams);
     const bytes = blocks.reduce((sum, block) => sum + block.bytes, 0);
     this.note(`${blocks.length} blocks in ${(bytes / 1e6).toFixed(1)} MB`);
     this.needsPicture = true;
@@ -256,8 +270,4 @@ async function show() {
   await viewer.load();
 }
 
-show().catch((error) => {
-  const isKnown = error instanceof Plain || error.constructor.name === 'DamagedModel';
-  say('Nothing to show', isKnown ? error.message : `${error}`);
-  if (!isKnown) throw error;
-});
+show().catch(report);

@@ -7,7 +7,11 @@ const next = (e) => (e % 3 === 2 ? e - 2 : e + 1);
 const previous = (e) => (e % 3 === 0 ? e + 2 : e - 1);
 
 // The part is not what model.json says of it, or its splits cannot be.
-export class DamagedModel extends Error {}
+export class DamagedModel extends Error {
+  constructor(what) {
+    super(`the model is damaged: ${what}`);
+  }
+}
 
 // Takes arrays of 32-bit words one after the other out of a part; of each, the lowest bytes come
 // first.
