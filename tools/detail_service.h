@@ -5,7 +5,7 @@
 //   model.json    what the page shows and needs to read the rest: name, crs, interval, the frame's
 //                 offset and step_m; triangles at the coarsest and finest levels; seams, a count; of
 //                 each block points, coarse_points, coarse_triangles, levels, its box in the frame's
-//                 coordinates, svo_m of its coarsest and finest level, bytes of its gzipped part
+//                 coordinates or null, svo_m of its coarsest and finest level, bytes of its gzipped part
 //   block/N.bin   application/octet-stream: the arrays point_x to svo of block N, counted from 0
 //   seams.bin     the arrays seam_block and seam_point
 // Arrays are those of the model's file (docs/DETAIL_FORMAT.md), one after the other without gaps; of

@@ -157,6 +157,20 @@ test('the sliders change the detail, the wireframe switch the picture', patience
   });
 });
 
+test('a browser without WebGL is told so in words', patience, async () => {
+  const blind = await launch('--disable-3d-apis');
+  try {
+    await withServer(model, async (address) => {
+      const { page, wrong } = await openPage(blind);
+      await page.goto(address);
+      await page.waitForSelector('text=no WebGL 2', { timeout: 60000 });
+      assert.deepEqual(wrong, []);
+    });
+  } finally {
+    await blind.close();
+  }
+});
+
 test('a server without three.js says how to get it', patience, async () => {
   const bare = join(work, 'pages');
   mkdirSync(bare, { recursive: true });

@@ -55,8 +55,9 @@ function terrainMaterial(ramp, heights, light, shade) {
   });
 }
 
-// The box that model.json tells, in the page's coordinates.
+// The box that model.json tells, in the page's coordinates; a block without points has none.
 export function boxOf(description, middle) {
+  if (description.box === null) return new THREE.Box3();
   const corner = (at) => new THREE.Vector3(...description.box[at]).sub(middle);
   return new THREE.Box3(corner(0), corner(1));
 }
