@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -10,7 +13,10 @@
 #include <string>
 
 #include "formats/errors.h"
+#include "formats/file_bytes.h"
 #include "formats/tile_set.h"
+#include "tools/detail_commands.h"
+#include "tools/detail_service.h"
 #include "tools/http_server.h"
 #include "tools/interrupt.h"
 #include "tools/page_files.h"
@@ -20,20 +26,22 @@ namespace qmpipe {
 namespace {
 
 constexpr const char* kFooter =
-    "Opens with a page that shows the terrain in CesiumJS, lit and coloured by height. In a page "
-    "of\n"
-    "your own: Cesium.CesiumTerrainProvider.fromUrl(\"http://127.0.0.1:8080/tiles\").\n"
+    "A tile set opens with a page that shows the terrain in CesiumJS, lit and coloured by\n"
+    "height. In a page of your own:\n"
+    "  Cesium.CesiumTerrainProvider.fromUrl(\"http://127.0.0.1:8080/tiles\")\n"
     "Tiles are sent with their media type and, where they are gzipped, with Content-Encoding; any\n"
-    "page may load them (CORS). A layer.json that is missing or does not fit the tiles is put "
-    "right\n"
-    "on the way out; the files stay as they are. Other machines are served only with --host "
-    "0.0.0.0:\n"
-    "this server knows no passwords and no https.\n"
+    "page may load them (CORS). A layer.json that is missing or does not fit the tiles is put\n"
+    "right on the way out; the files stay as they are.\n"
+    "A detail-increment model (qmpipe detail build) opens with a page that makes it finer as the\n"
+    "eye comes closer, in three.js.\n"
+    "Other machines are served only with --host 0.0.0.0: this server knows no passwords and no\n"
+    "https.\n"
     "Ctrl-C ends it.\n"
     "\n"
     "Examples:\n"
     "  qmpipe serve tiles\n"
-    "  qmpipe serve terrain.mbtiles --port 9000";
+    "  qmpipe serve terrain.mbtiles --port 9000\n"
+    "  qmpipe serve terrain.h5";
 
 struct ServeArguments {
   std::string path;
@@ -72,15 +80,33 @@ std::string greeting(const ServeArguments& arguments, const TileService& service
   return text + "Ctrl-C ends it.\n";
 }
 
-int run_serve(const ServeArguments& arguments) {
-  std::unique_ptr<TileSet> tile_set = open_tile_set(arguments.path);
-  if (tile_set->keys().empty()) {
-    throw IoError("cannot serve", arguments.path, "there is no tile in it", "Check the path.");
+std::string greeting(const ServeArguments& arguments, const DetailService& service,
+                     const PageFiles& pages, int port) {
+  const std::string address = address_of(arguments, port);
+  if (arguments.wants_json) {
+    const nlohmann::ordered_json object = {{"viewer", address},
+                                           {"model", address + "model.json"},
+                                           {"port", port},
+                                           {"blocks", service.blocks()},
+                                           {"coarsest_triangles", service.coarsest_triangles()},
+                                           {"finest_triangles", service.finest_triangles()}};
+    return object.dump() + "\n";
   }
-  const std::string name = std::filesystem::absolute(arguments.path).lexically_normal().stem();
-  const TileService service(std::move(tile_set), name);
+  std::string text = fmt::format("{}: {} to {} triangles in {} blocks\n  to look at it   {}\n",
+                                 arguments.path, service.coarsest_triangles(),
+                                 service.finest_triangles(), service.blocks(), address);
+  if (!pages.has_three()) {
+    text += "  three.js is not installed, so the page stays empty: run tools/setup.sh\n";
+  }
+  return text + "Ctrl-C ends it.\n";
+}
+
+// `start_page`: the address of the file that "/" is answered with.
+template <class Service>
+int serve(const ServeArguments& arguments, const Service& service, const char* start_page) {
   const PageFiles pages(find_page_folder());
-  HttpServer server(arguments.listen, [&](const HttpRequest& request) {
+  HttpServer server(arguments.listen, [&](HttpRequest request) {
+    if (request.path == "/") request.path = start_page;
     std::optional<HttpReply> reply = service.answer(request);
     return reply ? reply : pages.answer(request);
   });
@@ -91,17 +117,36 @@ int run_serve(const ServeArguments& arguments) {
   return 0;
 }
 
+// Of HDF5, which no form of a tile set is.
+bool looks_like_a_model(const std::string& path) {
+  constexpr std::array<std::uint8_t, 8> kSignature = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1A, '\n'};
+  const auto start = read_file_range(path, 0, kSignature.size());
+  return start && std::equal(start->begin(), start->end(), kSignature.begin());
+}
+
+int run_serve(const ServeArguments& arguments) {
+  const std::string name = std::filesystem::absolute(arguments.path).lexically_normal().stem();
+  if (looks_like_a_model(arguments.path)) {
+    return serve(arguments, DetailService(load_model(arguments.path), name), "/detail.html");
+  }
+  std::unique_ptr<TileSet> tile_set = open_tile_set(arguments.path);
+  if (tile_set->keys().empty()) {
+    throw IoError("cannot serve", arguments.path, "there is no tile in it", "Check the path.");
+  }
+  return serve(arguments, TileService(std::move(tile_set), name), "/index.html");
+}
+
 }  // namespace
 
 void register_serve(CLI::App& app, std::function<int()>& action) {
   const auto arguments = std::make_shared<ServeArguments>();
-  CLI::App* command =
-      app.add_subcommand("serve", "Serve a tile set over HTTP, with a page that shows it");
+  CLI::App* command = app.add_subcommand(
+      "serve", "Serve a tile set or a detail-increment model over HTTP, with a page that shows it");
   command->footer(kFooter);
   command
       ->add_option("OUT", arguments->path,
                    "The tile set: its folder, an .mbtiles or a .pmtiles file, ours or another "
-                   "program's")
+                   "program's; or the file of a detail-increment model")
       ->required();
   command->add_option("--port", arguments->listen.port, "Port; 0: any free one")
       ->check(CLI::Range(0, 65535))

@@ -68,6 +68,21 @@ PageFiles::PageFiles(const fs::path& folder) {
     if (has_cesium() || !is_file(cesium / "Cesium.js")) continue;
     list(cesium, "/cesium/");
   }
+  add_three(folder);
+}
+
+void PageFiles::add_three(const fs::path& folder) {
+  const fs::path npm = folder / "node_modules" / "three";
+  const std::array<std::pair<const char*, fs::path>, 3> in_npm = {{
+      {"three.module.js", npm / "build"},
+      {"three.core.js", npm / "build"},
+      {"OrbitControls.js", npm / "examples" / "jsm" / "controls"},
+  }};
+  for (const auto& [name, installed_by_npm] : in_npm) {
+    for (const fs::path& place : {installed_by_npm, folder / "three"}) {
+      if (is_file(place / name)) files_[std::string("/three/") + name] = place / name;
+    }
+  }
 }
 
 void PageFiles::list(const fs::path& folder, const std::string& address) {

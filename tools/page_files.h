@@ -15,7 +15,8 @@ namespace qmpipe {
 
 class PageFiles {
  public:
-  // `folder` holds index.html; CesiumJS is its subfolder cesium, or what npm installed there.
+  // `folder` holds index.html; CesiumJS is its subfolder cesium and three.js its subfolder three, or
+  // what npm installed there. Of three.js the files that detail.html loads are served, under /three/.
   // Throws IoError when the folder has no index.html or cannot be listed.
   explicit PageFiles(const std::filesystem::path& folder);
 
@@ -23,8 +24,10 @@ class PageFiles {
   std::optional<HttpReply> answer(const HttpRequest& request) const;
 
   bool has_cesium() const { return files_.contains("/cesium/Cesium.js"); }
+  bool has_three() const { return files_.contains("/three/three.module.js"); }
 
  private:
+  void add_three(const std::filesystem::path& folder);
   void list(const std::filesystem::path& folder, const std::string& address);
 
   std::map<std::string, std::filesystem::path, std::less<>> files_;  // by address

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what qmpipe needs on a bare Debian 12: compiler, build tools and libraries, and from npm
-# the CesiumJS of its viewer. Needs root (or sudo) where packages are missing. Safe to run again:
-# what is there is left alone.
+# the CesiumJS and three.js of its viewer pages. Needs root (or sudo) where packages are missing.
+# Safe to run again: what is there is left alone.
 #   tools/setup.sh          what a build and a look at its result need
 #   tools/setup.sh --dev    also what the tests and checks need: a browser, the web servers of
 #                           docs/SERVING.md, clang-format, clang-tidy, the fuzzer runtime, valgrind, perf

@@ -38,20 +38,6 @@ void for_each_item(std::string_view list, const Visit& visit) {
   }
 }
 
-// RFC 9110, section 12.5.3, as far as gzip is concerned.
-bool accepts_gzip(const std::string& accept_encoding) {
-  bool accepts = false;
-  for_each_item(accept_encoding, [&](std::string_view item) {
-    const std::size_t semicolon = std::min(item.find(';'), item.size());
-    const std::string_view coding = trimmed(item.substr(0, semicolon));
-    if (coding != "gzip" && coding != "x-gzip" && coding != "*") return;
-    std::string_view weight = trimmed(item.substr(std::min(semicolon + 1, item.size())));
-    if (weight.starts_with("q=")) weight.remove_prefix(2);
-    accepts = weight.empty() || weight.find_first_not_of("0.") != std::string_view::npos;
-  });
-  return accepts;
-}
-
 bool has_it(const std::string& if_none_match, const std::string& quoted_etag) {
   bool found = false;
   for_each_item(if_none_match, [&](std::string_view item) {
@@ -79,6 +65,19 @@ std::vector<TileKey> sampled_keys(const std::vector<TileKey>& keys) {
 }
 
 }  // namespace
+
+bool accepts_gzip(const std::string& accept_encoding) {
+  bool accepts = false;
+  for_each_item(accept_encoding, [&](std::string_view item) {
+    const std::size_t semicolon = std::min(item.find(';'), item.size());
+    const std::string_view coding = trimmed(item.substr(0, semicolon));
+    if (coding != "gzip" && coding != "x-gzip" && coding != "*") return;
+    std::string_view weight = trimmed(item.substr(std::min(semicolon + 1, item.size())));
+    if (weight.starts_with("q=")) weight.remove_prefix(2);
+    accepts = weight.empty() || weight.find_first_not_of("0.") != std::string_view::npos;
+  });
+  return accepts;
+}
 
 HttpReply error_reply(int status, const std::string& message) {
   HttpReply reply = {.status = status, .media_type = "application/json", .body = {}, .headers = {}};

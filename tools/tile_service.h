@@ -37,6 +37,9 @@ struct HttpReply {
   std::vector<std::pair<std::string, std::string>> headers;
 };
 
+// By its Accept-Encoding header (RFC 9110, section 12.5.3).
+bool accepts_gzip(const std::string& accept_encoding);
+
 // {"error": "..."} with that status.
 HttpReply error_reply(int status, const std::string& message);
 

@@ -1,10 +1,8 @@
 // A headless Chromium, a `qmpipe serve`, and what a page may not do: shared by the browser tests.
 
-import assert from 'node:assert/strict';
-import { execFileSync, spawn } from 'node:child_process';
-import { once } from 'node:events';
 import { existsSync } from 'node:fs';
-import { createInterface } from 'node:readline';
+
+export { program, qmpipe, run, withServer } from './server.mjs';
 
 const chromiumPath = '/usr/bin/chromium';
 // Drawing in software on a busy machine takes its time; what is wrong shows long before.
@@ -22,39 +20,10 @@ const chromiumFlags = [
 // WebGL without a graphics card.
 const softwareWebGl = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
 
-export const program = process.env.QMPIPE_PROGRAM;
-assert(program, 'QMPIPE_PROGRAM names the program to test');
-
-export function run(command, ...args) {
-  return execFileSync(command, args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'pipe'] });
-}
-
-export const qmpipe = (...args) => run(program, ...args);
-
 export const launch = (...flags) => chromium.launch({
   executablePath: chromiumPath,
   args: [...chromiumFlags, ...(flags.length > 0 ? flags : softwareWebGl)],
 });
-
-// Serves a set, calls visit(address), and ends the server whatever happens.
-export async function withServer(set, visit) {
-  const server = spawn(program, ['serve', set, '--port', '0', '--json'],
-                       { stdio: ['ignore', 'pipe', 'inherit'] });
-  try {
-    const lines = createInterface({ input: server.stdout });
-    const [line] = await Promise.race([
-      once(lines, 'line'),
-      once(server, 'exit').then(([code]) => { throw new Error(`serve ended with ${code}`); }),
-    ]);
-    const said = JSON.parse(line);
-    await visit(said.viewer, said);
-  } finally {
-    const ended = server.exitCode === null ? once(server, 'exit') : [server.exitCode];
-    server.kill('SIGINT');
-    const [code] = await ended;
-    assert.equal(code, 0, 'the server ends with exit code 0 on an interrupt');
-  }
-}
 
 // A page that collects everything that went wrong on it.
 export async function openPage(browser, viewport = { width: 960, height: 640 }) {
