@@ -88,7 +88,7 @@ using DetailSeam = std::array<DetailCorner, 3>;  // counter-clockwise
 struct DetailModel {
   DetailFrame frame;
   std::string crs_wkt;  // empty: unknown
-  // Levels are stepped through this many at a time; at least 1.
+  // Levels that one increment is merged over (stages/detail_increment.h); at least 1.
   std::uint32_t interval = 1;
   std::vector<DetailBlock> blocks;
   std::vector<DetailSeam> seams;

@@ -21,7 +21,7 @@ struct DetailBuildOptions {
   double keep_share = 0.2;
   // DEFAULT: 4, as in the paper.
   std::int32_t blocks = 4;
-  // Levels between two stored thresholds, and in a step of a viewer. DEFAULT: 100.
+  // Levels that one increment is merged over. DEFAULT: 100.
   std::uint32_t interval = 100;
   // Heights of a DEM are rounded to multiples of it. DEFAULT: 0, that is 1 m where all are whole metres,
   // else 1 cm.

@@ -99,6 +99,21 @@ class Detail(unittest.TestCase):
         self.extract("--level", "5", "--frame", "crs")
         self.extract("--level", "5", "--frame", "crs", name="mesh.glb", code=2)
 
+    def test_merged_increments_change_fewer_triangles(self):
+        sums = []
+        for interval in ("1", "5000"):
+            model = self.root / f"interval-{interval}.h5"
+            run("detail", "build", self.dem, "-o", model, "--interval", interval)
+            sums.append(json.loads(run("detail", "info", model, "--increments",
+                                       "--json").stdout)["increments"])
+        single, merged = sums
+        self.assertEqual(single["changed_merged"], single["changed_singly"])
+        self.assertEqual(single["raw_bytes_merged"], single["raw_bytes_singly"])
+        self.assertEqual(merged["changed_singly"], single["changed_singly"])
+        self.assertLess(merged["changed_merged"], 0.8 * merged["changed_singly"])
+        self.assertIn("merged over 5000 levels",
+                      run("detail", "info", self.root / "interval-5000.h5", "--increments").stdout)
+
     def test_chart_is_a_page_of_its_own(self):
         page = self.root / "chart.html"
         run("detail", "info", self.model, "--chart", page)

@@ -153,7 +153,9 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
       ->type_name("N");
   command
       ->add_option("--interval", options.interval,
-                   "Levels between two thresholds that the file keeps, and in a viewer's step")
+                   "Levels that an increment is merged over (detail info --increments), and "
+                   "between two that "
+                   "detail verify compares")
       ->capture_default_str()
       ->type_name("K");
   command

@@ -9,9 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "pipeline/detail_chart.h"
 #include "pipeline/detail_extract.h"
+#include "pipeline/detail_increments.h"
 #include "pipeline/detail_verify.h"
 #include "tools/detail_commands.h"
 #include "tools/interrupt.h"
@@ -53,6 +55,7 @@ struct InfoArguments {
   std::string path;
   std::string chart;
   DetailView view;
+  bool increments = false;
   bool json = false;
 };
 
@@ -83,6 +86,34 @@ void print_info(const InfoArguments& arguments, const DetailModel& model) {
   }
 }
 
+IncrementSums increments_of(const DetailModel& model, const std::string& path) {
+  const auto sums = sum_increments(model);
+  if (sums) return *sums;
+  throw IoError("cannot walk through", path, sums.error().message,
+                "Build the model again with qmpipe detail build.");
+}
+
+void print_increments(const IncrementSums& sums, std::uint32_t interval) {
+  const auto ratio = [](std::int64_t a, std::int64_t b) {
+    return static_cast<double>(a) / static_cast<double>(std::max<std::int64_t>(1, b));
+  };
+  fmt::print(
+      "increments of one level:  {}, {:.2f} changed triangles a level, {:.1f} bytes as arrays\n"
+      "merged over {} levels: {}, {:.2f} changed triangles a level, {:.1f} bytes as arrays\n",
+      sums.levels, ratio(sums.changed_singly, sums.levels),
+      ratio(sums.raw_bytes_singly, sums.levels), interval, sums.increments,
+      ratio(sums.changed_merged, sums.levels), ratio(sums.raw_bytes_merged, sums.levels));
+}
+
+Json increments_json(const IncrementSums& sums) {
+  return {{"levels", sums.levels},
+          {"increments", sums.increments},
+          {"changed_singly", sums.changed_singly},
+          {"changed_merged", sums.changed_merged},
+          {"raw_bytes_singly", sums.raw_bytes_singly},
+          {"raw_bytes_merged", sums.raw_bytes_merged}};
+}
+
 int run_info(const InfoArguments& arguments) {
   const DetailModel model = load_model(arguments.path);
   if (!arguments.chart.empty()) {
@@ -92,18 +123,23 @@ int run_info(const InfoArguments& arguments) {
   }
   if (!arguments.json) {
     print_info(arguments, model);
+    if (arguments.increments)
+      print_increments(increments_of(model, arguments.path), model.interval);
     return 0;
   }
   Json blocks = Json::array();
   for (const DetailBlock& block : model.blocks) blocks.push_back(block_json(block));
-  const Json document = {{"interval", model.interval},
-                         {"crs", model.crs_wkt},
-                         {"offset", model.frame.offset},
-                         {"step_m", model.frame.step_m},
-                         {"seam_triangles", model.seams.size()},
-                         {"coarsest_triangles", triangles_of(model, levels_at(model, 0))},
-                         {"finest_triangles", triangles_of(model, levels_for_svo(model, 0))},
-                         {"blocks", std::move(blocks)}};
+  Json document = {{"interval", model.interval},
+                   {"crs", model.crs_wkt},
+                   {"offset", model.frame.offset},
+                   {"step_m", model.frame.step_m},
+                   {"seam_triangles", model.seams.size()},
+                   {"coarsest_triangles", triangles_of(model, levels_at(model, 0))},
+                   {"finest_triangles", triangles_of(model, levels_for_svo(model, 0))},
+                   {"blocks", std::move(blocks)}};
+  if (arguments.increments) {
+    document["increments"] = increments_json(increments_of(model, arguments.path));
+  }
   fmt::print("{}\n", document.dump(2, ' ', false, Json::error_handler_t::replace));
   return 0;
 }
@@ -154,6 +190,10 @@ void register_detail_info(CLI::App& detail, std::function<int()>& action) {
           "threshold")
       ->type_name("HTML");
   add_view_options(*command, arguments->view);
+  command->add_flag(
+      "--increments", arguments->increments,
+      "Walk through the model and tell how many triangles change a level, one by one and "
+      "merged over its interval");
   command->add_flag("--json", arguments->json, "Write JSON");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_info(*arguments); }; });
