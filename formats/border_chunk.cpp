@@ -1,12 +1,11 @@
 #include "formats/border_chunk.h"
 
 #include <fmt/format.h>
-#include <zstd.h>
 
 #include <bit>
-#include <new>
 
 #include "formats/little_endian.h"
+#include "formats/zstd_bytes.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
@@ -55,7 +54,7 @@ std::string to_string(const BorderKey& key) {
 }
 
 std::size_t largest_border_chunk_bytes() {
-  return ZSTD_compressBound(kMaxChunkBorders * kBorderBytes);
+  return largest_zstd_bytes(kMaxChunkBorders * kBorderBytes);
 }
 
 std::vector<std::uint8_t> pack_borders(std::span<const Border> borders, std::size_t records,
@@ -67,31 +66,19 @@ std::vector<std::uint8_t> pack_borders(std::span<const Border> borders, std::siz
     store_record(record.data(), borders[n]);
     for (std::size_t k = 0; k < kBorderBytes; ++k) planes[k * records + n] = record[k];
   }
-  std::vector<std::uint8_t> chunk(ZSTD_compressBound(planes.size()));
-  const std::size_t packed_bytes =
-      ZSTD_compress(chunk.data(), chunk.size(), planes.data(), planes.size(), level);
-  if (ZSTD_isError(packed_bytes) != 0) throw std::bad_alloc();
-  chunk.resize(packed_bytes);
-  return chunk;
+  return zstd_pack(planes, level);
 }
 
 Result<std::vector<Border>> unpack_borders(std::span<const std::uint8_t> chunk, std::size_t count,
                                            std::size_t records) {
   QMPIPE_CHECK(count >= 1 && count <= records && records <= kMaxChunkBorders);
-  std::vector<std::uint8_t> planes(records * kBorderBytes);
-  const std::size_t plain_bytes =
-      ZSTD_decompress(planes.data(), planes.size(), chunk.data(), chunk.size());
-  if (ZSTD_isError(plain_bytes) != 0) {
-    return Error{fmt::format("it does not decompress: {}", ZSTD_getErrorName(plain_bytes))};
-  }
-  if (plain_bytes != planes.size()) {
-    return Error{fmt::format("it holds {} bytes instead of {}", plain_bytes, planes.size())};
-  }
+  const auto planes = zstd_unpack(chunk, records * kBorderBytes);
+  if (!planes) return planes.error();
   std::vector<Border> borders;
   borders.reserve(count);
   for (std::size_t n = 0; n < count; ++n) {
     std::array<std::uint8_t, kBorderBytes> record{};
-    for (std::size_t k = 0; k < kBorderBytes; ++k) record[k] = planes[k * records + n];
+    for (std::size_t k = 0; k < kBorderBytes; ++k) record[k] = (*planes)[k * records + n];
     if (!is_record(record.data())) return Error{fmt::format("its record {} is no border", n)};
     const Border border = load_record(record.data());
     if (n > 0 && borders.back().key >= border.key) {
