@@ -20,8 +20,17 @@ namespace {
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
-std::uint64_t hash_of(std::span<const std::uint32_t> vertices) {
-  return hash64({reinterpret_cast<const std::uint8_t*>(vertices.data()), vertices.size_bytes()}, 0);
+// One term for each triangle, so that the sum over all follows a change of a few.
+std::uint64_t term_of(const DetailWalk& walk, std::size_t triangle) {
+  const auto vertices = walk.triangles().subspan(3 * triangle, 3);
+  return hash64({reinterpret_cast<const std::uint8_t*>(vertices.data()), vertices.size_bytes()},
+                triangle);
+}
+
+std::uint64_t sum_of(const DetailWalk& walk) {
+  std::uint64_t sum = 0;
+  for (std::size_t t = 0; t < walk.triangles().size() / 3; ++t) sum += term_of(walk, t);
+  return sum;
 }
 
 // Edges with a triangle on their left only, sorted.
@@ -41,8 +50,7 @@ std::vector<Edge> rim_of(std::span<const std::uint32_t> vertices) {
 
 class BlockWalk {
  public:
-  BlockWalk(const DetailBlock& block, std::size_t interval, Progress& progress)
-      : block_(block), interval_(interval), progress_(progress) {}
+  BlockWalk(const DetailBlock& block, Progress& progress) : block_(block), progress_(progress) {}
 
   std::int64_t triangles_checked() const { return triangles_checked_; }
 
@@ -83,49 +91,63 @@ class BlockWalk {
     return fmt::format("triangle {} of level {} is not counter-clockwise", triangle, walk.level());
   }
 
-  bool is_compared(std::size_t level) const { return level % interval_ == 0; }
-
   std::optional<std::string> walk_up(DetailWalk& walk) {
     std::vector<std::uint32_t> changed;
-    hashes_.push_back(hash_of(walk.triangles()));
+    std::uint64_t sum = sum_of(walk);
+    sums_.push_back(sum);
     while (walk.level() < block_.levels()) {
       changed.clear();
-      if (auto error = walk.refine([&](std::uint32_t t) { changed.push_back(t); })) {
-        return error->message;
-      }
+      auto error = walk.refine([&](std::uint32_t t) {
+        sum -= term_of(walk, t);
+        changed.push_back(t);
+      });
+      if (error) return error->message;
       const std::size_t triangles = walk.triangles().size() / 3;
       changed.push_back(static_cast<std::uint32_t>(triangles - 2));
       changed.push_back(static_cast<std::uint32_t>(triangles - 1));
       for (const std::uint32_t t : changed) {
         if (auto fault = fault_of_triangle(walk, t)) return fault;
+        sum += term_of(walk, t);
       }
-      if (is_compared(walk.level())) note_level(walk);
+      sums_.push_back(sum);
+      note_level(walk);
     }
     return std::nullopt;
   }
 
   void note_level(const DetailWalk& walk) {
-    hashes_.push_back(hash_of(walk.triangles()));
-    progress_.advance(static_cast<std::int64_t>(interval_));
+    constexpr std::size_t kLevelsATime = 4096;
+    if (walk.level() % kLevelsATime != 0) return;
+    progress_.advance(kLevelsATime);
     progress_.check_stop();
   }
 
   std::optional<std::string> walk_down(DetailWalk& walk) {
+    std::vector<std::uint32_t> changed;
+    // Anew, not what the way up ended with.
+    std::uint64_t sum = sum_of(walk);
     while (walk.level() > 0) {
-      walk.coarsen();
-      if (!is_compared(walk.level())) continue;
-      if (hashes_[walk.level() / interval_] != hash_of(walk.triangles())) {
+      changed.clear();
+      const std::size_t triangles = walk.triangles().size() / 3;
+      sum -= term_of(walk, triangles - 2) + term_of(walk, triangles - 1);
+      walk.coarsen([&](std::uint32_t t) {
+        sum -= term_of(walk, t);
+        changed.push_back(t);
+      });
+      for (const std::uint32_t t : changed) sum += term_of(walk, t);
+      if (sums_[walk.level()] != sum) {
         return fmt::format("level {} is another mesh on the way back", walk.level());
       }
-      progress_.check_stop();
+      note_level(walk);
     }
+    // What was not told as changed stands as it was.
+    if (sum_of(walk) != sums_.front()) return "the coarsest level is another mesh on the way back";
     return std::nullopt;
   }
 
   const DetailBlock& block_;
-  const std::size_t interval_;
   Progress& progress_;
-  std::vector<std::uint64_t> hashes_;  // of the levels compared
+  std::vector<std::uint64_t> sums_;  // of each level
   std::int64_t triangles_checked_ = 0;
 };
 
@@ -237,11 +259,11 @@ DetailVerifyReport verify_detail(const DetailModel& model, std::int32_t threads,
   for (const DetailBlock& block : model.blocks) levels += static_cast<std::int64_t>(block.levels());
   std::vector<std::optional<std::string>> faults(model.blocks.size());
   std::atomic<std::int64_t> triangles = 0;
-  progress.begin("verify", "levels", levels);
+  progress.begin("verify", "levels", 2 * levels);
   tbb::task_arena arena(threads);
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, model.blocks.size(), [&](std::size_t b) {
-      BlockWalk walk(model.blocks[b], model.interval, progress);
+      BlockWalk walk(model.blocks[b], progress);
       faults[b] = walk.find_fault();
       triangles += walk.triangles_checked();
     });

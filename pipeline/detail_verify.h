@@ -21,7 +21,7 @@ struct DetailVerifyReport {
 };
 
 // Checks that: every split can be done; every triangle of every level is counter-clockwise; the way down
-// leads to the same meshes as the way up (compared every `interval` levels); a block's rim is the same
+// leads to the same mesh at every level as the way up; a block's rim is the same
 // on all levels; thresholds are finite and never rise towards finer levels; no edge of the whole, at the
 // coarsest and the finest level, belongs to three triangles or to two on one side; no two triangles
 // overlap there, as far as some thousand random places show. Of each block the first fault is told.

@@ -49,8 +49,15 @@ class DetailWalk {
   std::optional<Error> refine() {
     return refine([](std::uint32_t /*triangle*/) {});
   }
-  // One level coarser. REQUIRES: level() > 0.
-  void coarsen();
+  // One level coarser; likewise tells each triangle that stays and changes. REQUIRES: level() > 0.
+  template <class Touched>
+  void coarsen(const Touched& touched) {
+    const DetailSplit& split = block_->splits[level_ - 1];
+    std::uint32_t e = split.half_edge;
+    for (std::uint32_t k = 0; k < split.fan; ++k, e = twins_[previous(e)]) touched(e / 3);
+    merge();
+  }
+  void coarsen() { merge(); }
   // REQUIRES: level <= levels.
   std::optional<Error> go_to(std::size_t level);
 
@@ -63,6 +70,7 @@ class DetailWalk {
   explicit DetailWalk(const DetailBlock& block) : block_(&block) {}
   Result<Fan> fan_of_next_split() const;
   void split(const Fan& fan);
+  void merge();
   static constexpr std::uint32_t kNone = 0xFFFFFFFF;
   static std::uint32_t next(std::uint32_t e) { return e % 3 == 2 ? e - 2 : e + 1; }
   static std::uint32_t previous(std::uint32_t e) { return e % 3 == 0 ? e + 2 : e - 1; }

@@ -109,7 +109,7 @@ void DetailWalk::split(const Fan& fan) {
   ++level_;
 }
 
-void DetailWalk::coarsen() {
+void DetailWalk::merge() {
   QMPIPE_CHECK(level_ > 0);
   --level_;
   const DetailSplit& split = block_->splits[level_];

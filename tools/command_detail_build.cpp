@@ -153,9 +153,7 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
       ->type_name("N");
   command
       ->add_option("--interval", options.interval,
-                   "Levels that an increment is merged over (detail info --increments), and "
-                   "between two that "
-                   "detail verify compares")
+                   "Levels that an increment is merged over (detail info --increments)")
       ->capture_default_str()
       ->type_name("K");
   command
