@@ -4,7 +4,8 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <atomic>
-#include <memory>
+#include <utility>
+#include <vector>
 
 #include "scheduler/check.h"
 
@@ -20,8 +21,13 @@ std::int64_t work_in_order(std::int32_t threads, std::int64_t count,
                            const std::function<InTurn(std::int64_t)>& work,
                            const std::function<bool()>& should_stop) {
   QMPIPE_CHECK(threads >= 1);
-  // TBB copies small values only.
-  using Message = std::shared_ptr<InTurn>;
+  const std::size_t most_at_once = static_cast<std::size_t>(threads) * kResultsPerThread;
+  // TBB passes numbers only: of a run that an exception ends it forgets what lies between its filters,
+  // and would not free it. No two numbers on the way share a place.
+  std::vector<InTurn> results(most_at_once);
+  const auto place_of = [&](std::int64_t index) -> InTurn& {
+    return results[static_cast<std::size_t>(index) % most_at_once];
+  };
   std::int64_t next = 0;
   std::int64_t taken = 0;
   std::atomic<bool> is_ended = false;
@@ -32,12 +38,14 @@ std::int64_t work_in_order(std::int32_t threads, std::int64_t count,
     }
     return next++;
   };
-  const auto work_on = [&](std::int64_t index) -> Message {
-    return is_ended ? nullptr : std::make_shared<InTurn>(work(index));
+  const auto work_on = [&](std::int64_t index) {
+    if (!is_ended) place_of(index) = work(index);
+    return index;
   };
-  const auto take = [&](const Message& in_turn) {
+  const auto take = [&](std::int64_t index) {
+    const InTurn in_turn = std::exchange(place_of(index), {});
     if (is_ended) return;
-    if ((*in_turn)()) {
+    if (in_turn()) {
       ++taken;
     } else {
       is_ended = true;
@@ -46,10 +54,10 @@ std::int64_t work_in_order(std::int32_t threads, std::int64_t count,
   tbb::task_arena arena(threads);
   arena.execute([&] {
     tbb::parallel_pipeline(
-        static_cast<std::size_t>(threads) * kResultsPerThread,
+        most_at_once,
         tbb::make_filter<void, std::int64_t>(tbb::filter_mode::serial_in_order, feed) &
-            tbb::make_filter<std::int64_t, Message>(tbb::filter_mode::parallel, work_on) &
-            tbb::make_filter<Message, void>(tbb::filter_mode::serial_in_order, take));
+            tbb::make_filter<std::int64_t, std::int64_t>(tbb::filter_mode::parallel, work_on) &
+            tbb::make_filter<std::int64_t, void>(tbb::filter_mode::serial_in_order, take));
   });
   return taken;
 }
