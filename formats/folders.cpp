@@ -2,6 +2,7 @@
 
 #include <system_error>
 
+#include "formats/errors.h"
 #include "formats/file_bytes.h"
 
 namespace qmpipe {
@@ -12,6 +13,14 @@ void make_folders(const fs::path& folder) {
   std::error_code code;
   fs::create_directories(folder, code);
   if (code) throw_io_error("cannot create the folder", folder, code.value());
+}
+
+void require_folder_of(const std::filesystem::path& file, const std::string& what_failed) {
+  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
+  std::error_code code;
+  if (std::filesystem::is_directory(folder, code)) return;
+  throw IoError(what_failed, file.string(), "there is no folder " + folder.string(),
+                "make it, or choose another name");
 }
 
 std::vector<fs::directory_entry> entries_of(const fs::path& folder) {

@@ -2,12 +2,17 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace qmpipe {
 
 // The folders above it too; nothing when it is there. Throws IoError.
 void make_folders(const std::filesystem::path& folder);
+
+// For a file that is to be written after hours of work: throws the IoError that says so, beginning with
+// `what_failed`, when there is no folder for it.
+void require_folder_of(const std::filesystem::path& file, const std::string& what_failed);
 
 // What stands in a folder, in no order. Throws IoError.
 std::vector<std::filesystem::directory_entry> entries_of(const std::filesystem::path& folder);

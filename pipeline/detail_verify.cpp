@@ -14,11 +14,10 @@
 
 #include "formats/hash64.h"
 #include "stages/detail_block.h"
+#include "stages/triangle_edges.h"
 
 namespace qmpipe {
 namespace {
-
-using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
 // One term for each triangle, so that the sum over all follows a change of a few.
 std::uint64_t term_of(const DetailWalk& walk, std::size_t triangle) {
@@ -31,21 +30,6 @@ std::uint64_t sum_of(const DetailWalk& walk) {
   std::uint64_t sum = 0;
   for (std::size_t t = 0; t < walk.triangles().size() / 3; ++t) sum += term_of(walk, t);
   return sum;
-}
-
-// Edges with a triangle on their left only, sorted.
-std::vector<Edge> rim_of(std::span<const std::uint32_t> vertices) {
-  std::vector<Edge> edges;
-  edges.reserve(vertices.size());
-  for (std::size_t e = 0; e < vertices.size(); ++e) {
-    edges.emplace_back(vertices[e], vertices[e % 3 == 2 ? e - 2 : e + 1]);
-  }
-  std::sort(edges.begin(), edges.end());
-  std::vector<Edge> rim;
-  for (const auto& [from, to] : edges) {
-    if (!std::binary_search(edges.begin(), edges.end(), Edge(to, from))) rim.emplace_back(from, to);
-  }
-  return rim;
 }
 
 class BlockWalk {
@@ -61,7 +45,7 @@ class BlockWalk {
     for (std::size_t t = 0; t < walk->triangles().size() / 3; ++t) {
       if (auto fault = fault_of_triangle(*walk, t)) return fault;
     }
-    const std::vector<Edge> rim = rim_of(walk->triangles());
+    const auto rim = rim_of(walk->triangles());
     if (auto fault = walk_up(*walk)) return fault;
     if (rim_of(walk->triangles()) != rim) return "its rim differs between levels";
     return walk_down(*walk);

@@ -4,6 +4,7 @@
 
 #include "scheduler/check.h"
 #include "stages/detail_base.h"
+#include "stages/triangle_edges.h"
 
 namespace qmpipe {
 namespace {
@@ -29,31 +30,12 @@ class CornerSets {
   std::vector<std::uint32_t> parent_;
 };
 
-struct Edge {
-  std::uint64_t ends;
-  std::uint32_t half_edge;
-};
-
-std::vector<Edge> sorted_edges(std::span<const std::uint32_t> triangles) {
-  std::vector<Edge> edges;
-  edges.reserve(triangles.size());
-  for (std::uint32_t e = 0; e < triangles.size(); ++e) {
-    const std::uint64_t from = triangles[e];
-    const std::uint64_t to = triangles[e % 3 == 2 ? e - 2 : e + 1];
-    edges.push_back({.ends = std::min(from, to) << 32U | std::max(from, to), .half_edge = e});
-  }
-  std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
-    return a.ends != b.ends ? a.ends < b.ends : a.half_edge < b.half_edge;
-  });
-  return edges;
-}
-
 }  // namespace
 
 void separate_fans(std::vector<DetailPoint>& points, std::vector<std::uint32_t>& triangles,
                    std::vector<std::uint32_t>& origin) {
   CornerSets fans(triangles.size());
-  const std::vector<Edge> edges = sorted_edges(triangles);
+  const std::vector<TriangleEdge> edges = sorted_edges(triangles);
   const auto next = [](std::uint32_t e) { return e % 3 == 2 ? e - 2 : e + 1; };
   for (std::size_t k = 1; k < edges.size(); ++k) {
     if (edges[k].ends != edges[k - 1].ends) continue;

@@ -12,6 +12,7 @@
 #include "scheduler/check.h"
 #include "stages/detail_base.h"
 #include "stages/morton.h"
+#include "stages/triangle_edges.h"
 
 namespace qmpipe {
 namespace {
@@ -77,23 +78,6 @@ void put_in_order(std::vector<std::array<std::uint32_t, 3>>& triangles) {
   std::sort(triangles.begin(), triangles.end());
 }
 
-// Edges of a block's mesh that have a triangle on their left only.
-std::vector<std::pair<std::uint32_t, std::uint32_t>> rim_of(const BaseBlock& block) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
-  const auto& t = block.triangles;
-  for (std::size_t e = 0; e < t.size(); ++e) {
-    edges.emplace_back(t[e], t[e % 3 == 2 ? e - 2 : e + 1]);
-  }
-  std::sort(edges.begin(), edges.end());
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> rim;
-  for (const auto& [from, to] : edges) {
-    if (!std::binary_search(edges.begin(), edges.end(), std::pair(to, from))) {
-      rim.emplace_back(from, to);
-    }
-  }
-  return rim;
-}
-
 enum class Region : std::uint8_t { kUnknown, kBlock };
 
 class HullJoiner {
@@ -138,7 +122,7 @@ class HullJoiner {
       vertices[k] = triangulation_.insert(place_of(block.points[k]));
       vertices[k]->info() = {.block = b, .point = k};
     };
-    for (const auto& [from, to] : rim_of(block)) {
+    for (const auto& [from, to] : rim_of(block.triangles)) {
       insert(from);
       insert(to);
       triangulation_.insert_constraint(vertices[from], vertices[to]);

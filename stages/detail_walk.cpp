@@ -5,17 +5,9 @@
 
 #include "scheduler/check.h"
 #include "stages/detail_block.h"
+#include "stages/triangle_edges.h"
 
 namespace qmpipe {
-namespace {
-
-// An edge with its lower vertex first, and the half-edge it was found as.
-struct EdgeOfTriangle {
-  std::uint64_t ends;
-  std::uint32_t half_edge;
-};
-
-}  // namespace
 
 Result<DetailWalk> DetailWalk::start(const DetailBlock& block) {
   DetailWalk walk(block);
@@ -29,26 +21,19 @@ Result<DetailWalk> DetailWalk::start(const DetailBlock& block) {
     return Error{
         fmt::format("the coarsest mesh names point {} of {}", vertex, block.coarse_points())};
   }
-  walk.vertices_.reserve(half_edges);
-  walk.twins_.reserve(half_edges);
   walk.vertices_ = block.coarse_triangles;
   walk.vertices_.reserve(half_edges);
+  walk.twins_.reserve(half_edges);
   if (auto error = walk.find_twins()) return std::move(*error);
   return walk;
 }
 
 std::optional<Error> DetailWalk::find_twins() {
-  std::vector<EdgeOfTriangle> edges;
-  edges.reserve(vertices_.size());
   for (std::uint32_t e = 0; e < vertices_.size(); ++e) {
-    const std::uint64_t from = vertices_[e];
-    const std::uint64_t to = vertices_[next(e)];
-    if (from == to) return Error{fmt::format("triangle {} has a point twice", e / 3)};
-    edges.push_back({.ends = std::min(from, to) << 32U | std::max(from, to), .half_edge = e});
+    if (vertices_[e] != vertices_[next(e)]) continue;
+    return Error{fmt::format("triangle {} has a point twice", e / 3)};
   }
-  std::sort(edges.begin(), edges.end(), [](const EdgeOfTriangle& a, const EdgeOfTriangle& b) {
-    return a.ends != b.ends ? a.ends < b.ends : a.half_edge < b.half_edge;
-  });
+  const std::vector<TriangleEdge> edges = sorted_edges(vertices_);
   twins_.assign(vertices_.size(), kNone);
   for (std::size_t k = 1; k < edges.size(); ++k) {
     if (edges[k].ends != edges[k - 1].ends) continue;

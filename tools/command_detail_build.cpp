@@ -11,6 +11,7 @@
 
 #include "formats/detail_file.h"
 #include "formats/errors.h"
+#include "formats/folders.h"
 #include "pipeline/detail_build.h"
 #include "pipeline/process_memory.h"
 #include "tools/detail_commands.h"
@@ -51,14 +52,6 @@ double parse_keep(const std::string& text) {
     // Not a number: said below.
   }
   throw UsageError(fmt::format("--keep {}: give a share, as 20% or 0.2", text));
-}
-
-void require_output(const BuildArguments& arguments) {
-  const fs::path folder = fs::absolute(arguments.output).parent_path();
-  std::error_code code;
-  if (fs::is_directory(folder, code)) return;
-  throw IoError("cannot write the model", arguments.output, "there is no folder " + folder.string(),
-                "make it, or choose another name");
 }
 
 void print_text(const BuildArguments& arguments, const DetailBuilt& built,
@@ -108,7 +101,7 @@ int run_build(BuildArguments arguments) {
   if (!arguments.classes.empty()) {
     arguments.options.points.classes = parse_point_classes(arguments.classes);
   }
-  require_output(arguments);
+  require_folder_of(arguments.output, "cannot write the model");
   ProgressStyle style =
       ::isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent;
   Progress progress(style, stop_flag_of_signals());

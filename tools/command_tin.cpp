@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/errors.h"
+#include "formats/folders.h"
 #include "pipeline/process_memory.h"
 #include "pipeline/single_tin.h"
 #include "tools/method_arguments.h"
@@ -99,16 +100,6 @@ TinFrame to_frame(const TinArguments& arguments) {
         "write a .ply or .obj, or leave --frame out");
   }
   return TinFrame::kCrs;
-}
-
-// Before the work, not after it.
-void require_folder_of(const std::string& output) {
-  const fs::path folder = fs::absolute(output).parent_path();
-  std::error_code code;
-  if (!fs::is_directory(folder, code)) {
-    throw IoError("cannot write the mesh", output, "there is no folder " + folder.string(),
-                  "make it, or choose another name");
-  }
 }
 
 void print_effective(const TinArguments& arguments, const SingleTinOptions& options) {
@@ -223,7 +214,7 @@ void print_json(const SingleTinOptions& options, const SingleTin& single, const 
 int run_tin(const TinArguments& arguments) {
   const TinFrame frame = to_frame(arguments);
   const SingleTinOptions options = to_options(arguments);
-  require_folder_of(arguments.output);
+  require_folder_of(arguments.output, "cannot write the mesh");
   if (arguments.verbose) print_effective(arguments, options);
   const SingleTin single = make_single_tin(options);
   for (const std::string& assumption : single.dem.info.assumptions) {
