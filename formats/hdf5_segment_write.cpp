@@ -95,7 +95,7 @@ void Hdf5SegmentWriter::create_chunked(const char* name, std::int64_t type,
   const Hdf5Handle space = made(H5Screate_simple(rank, size.data(), nullptr), H5Sclose);
   const Hdf5Handle creation = made(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   // The time would differ from run to run.
-  check(H5Pset_obj_track_times(creation.id(), 0));
+  check(H5Pset_obj_track_times(creation.id(), false));
   check(H5Pset_chunk(creation.id(), rank, chunk.data()));
   if (fill != nullptr) check(H5Pset_fill_value(creation.id(), fill_type, fill));
   check(H5Pset_shuffle(creation.id()));
@@ -121,7 +121,7 @@ void Hdf5SegmentWriter::write_values(const char* name, std::size_t columns,
   const Hdf5Handle space =
       made(H5Screate_simple(columns > 1 ? 2 : 1, shape.data(), nullptr), H5Sclose);
   const Hdf5Handle creation = made(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-  check(H5Pset_obj_track_times(creation.id(), 0));
+  check(H5Pset_obj_track_times(creation.id(), false));
   const Hdf5Handle dataset = made(
       H5Dcreate2(file_.id(), name, file_type, space.id(), H5P_DEFAULT, creation.id(), H5P_DEFAULT),
       H5Dclose);
