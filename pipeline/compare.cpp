@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 
 #include "formats/errors.h"
 #include "formats/tile_set.h"
+#include "pipeline/stopwatch.h"
 #include "pipeline/verify_source.h"
 #include "stages/mesh_order.h"
 #include "stages/quantize.h"
@@ -55,10 +55,9 @@ TileTrial try_tile(const Recipe& recipe, const TileKey& key, std::span<const flo
   TileTrial trial;
   std::vector<double> seconds;
   for (int run = 0; run < kTrialRuns; ++run) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     trial.tin = simplify(grid, heights_m, {}, options);
-    seconds.push_back(
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    seconds.push_back(watch.seconds());
   }
   std::nth_element(seconds.begin(), seconds.begin() + kTrialRuns / 2, seconds.end());
   trial.seconds = seconds[kTrialRuns / 2];

@@ -5,7 +5,6 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -14,17 +13,12 @@
 #include "formats/errors.h"
 #include "formats/raster_source.h"
 #include "pipeline/dem.h"
+#include "pipeline/stopwatch.h"
 #include "stages/detail_block.h"
 #include "stages/detail_simplify.h"
 
 namespace qmpipe {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 void require_sound(const DetailBuildOptions& options) {
   if (!(options.keep_share > 0 && options.keep_share <= 1)) {
@@ -93,7 +87,7 @@ void note_assumptions(const std::string& path, const std::vector<std::string>& a
 
 Input read_dem_input(const DetailBuildOptions& options, Progress& progress,
                      DetailBuildReport& report) {
-  Clock::time_point start = Clock::now();
+  Stopwatch watch;
   const std::unique_ptr<RasterSource> source = RasterSource::open(
       options.input, {.crs_override = options.points.source_crs, .placing = Placing::kPlane});
   const Dem dem = read_dem(*source);
@@ -102,12 +96,11 @@ Input read_dem_input(const DetailBuildOptions& options, Progress& progress,
   input.frame = frame_of(dem, options.height_step_m);
   input.crs_wkt = dem.info.crs_wkt;
   const std::vector<std::int32_t> z = rounded_heights(dem, input.frame.step_m[2]);
-  report.read_s = seconds_since(start);
-  start = Clock::now();
+  report.read_s = watch.lap();
   input.base = grid_base(
       {.columns = dem.grid.width_posts, .rows = dem.grid.height_posts, .z = z, .valid = dem.valid},
       block_grid_of(options.blocks));
-  report.triangulate_s = seconds_since(start);
+  report.triangulate_s = watch.seconds();
   std::size_t used = 0;
   for (const BaseBlock& block : input.base.blocks) used += block.points.size();
   report.left_out = static_cast<std::int64_t>(dem.post_count()) - static_cast<std::int64_t>(used);
@@ -116,14 +109,13 @@ Input read_dem_input(const DetailBuildOptions& options, Progress& progress,
 
 Input read_cloud_input(const DetailBuildOptions& options, Progress& progress,
                        DetailBuildReport& report) {
-  Clock::time_point start = Clock::now();
+  Stopwatch watch;
   const PointCloud cloud = read_point_cloud(options.input, options.points);
   note_assumptions(options.input, cloud.assumptions, progress);
   report.left_out = static_cast<std::int64_t>(cloud.counts.in_file) -
                     static_cast<std::int64_t>(cloud.points.size());
   report.left_out_text = left_out(cloud.counts);
-  report.read_s = seconds_since(start);
-  start = Clock::now();
+  report.read_s = watch.lap();
   Input input;
   input.frame = cloud.frame;
   input.crs_wkt = cloud.crs_wkt;
@@ -136,7 +128,7 @@ Input read_cloud_input(const DetailBuildOptions& options, Progress& progress,
     });
   });
   input.base.seams = join_hulls(input.base.blocks);
-  report.triangulate_s = seconds_since(start);
+  report.triangulate_s = watch.seconds();
   return input;
 }
 
@@ -212,10 +204,10 @@ DetailBuilt build_detail(const DetailBuildOptions& options, Progress& progress) 
                   "there are no three valid points that make a triangle",
                   "check what is in it, as with gdalinfo -stats");
   }
-  const Clock::time_point start = Clock::now();
+  const Stopwatch watch;
   built.model = simplify_base(std::move(input.base), input.frame, options, progress, built.report);
   built.model.crs_wkt = input.crs_wkt;
-  built.report.simplify_s = seconds_since(start);
+  built.report.simplify_s = watch.seconds();
   return built;
 }
 

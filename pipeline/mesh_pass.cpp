@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <chrono>
 #include <optional>
 
 #include "formats/errors.h"
@@ -11,6 +10,7 @@
 #include "formats/hdf5_border_store.h"
 #include "pipeline/checkpointer.h"
 #include "pipeline/report_state.h"
+#include "pipeline/stopwatch.h"
 #include "pipeline/tile_graph.h"
 
 namespace qmpipe {
@@ -99,7 +99,7 @@ BuildReport run_mesh_pass(const BuildOptions& options, const BuildPlan& plan,
                           const Heightfield& heightfield, const MemoryPlan& memory, TileSink& sink,
                           RunRecord* record, Progress& progress) {
   BuildReport report = empty_report(options, plan, memory);
-  const auto started = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const std::unique_ptr<BorderStore> borders = open_borders(plan, heightfield, record);
   std::optional<Checkpointer> checkpointer;
   if (record != nullptr) {
@@ -131,7 +131,7 @@ BuildReport run_mesh_pass(const BuildOptions& options, const BuildPlan& plan,
                   "Run the same command again; what is missing is built again.");
   }
   report.largest_in_flight = result.largest_in_flight;
-  report.mesh_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  report.mesh_s = watch.seconds();
   return report;
 }
 

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -54,7 +55,7 @@ void Progress::begin(const std::string& phase, const std::string& unit, std::int
   total_ = total;
   fills_ = std::move(fills);
   done_.store(0);
-  started_ = std::chrono::steady_clock::now();
+  watch_ = Stopwatch();
   active_ = true;
 }
 
@@ -96,8 +97,7 @@ void Progress::run() {
 
 // REQUIRES: mutex_ is held.
 void Progress::report(bool final) {
-  const double elapsed_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+  const double elapsed_s = watch_.seconds();
   const std::int64_t done = done_.load(std::memory_order_relaxed);
   const double rate = elapsed_s > 0 ? static_cast<double>(done) / elapsed_s : 0;
   const double left_s =

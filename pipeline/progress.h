@@ -6,7 +6,6 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -16,6 +15,8 @@
 #include <string>
 #include <thread>
 #include <vector>
+
+#include "pipeline/stopwatch.h"
 
 namespace qmpipe {
 
@@ -72,7 +73,7 @@ class Progress {
   std::string unit_;
   std::int64_t total_ = 0;
   std::function<std::vector<BufferFill>()> fills_;
-  std::chrono::steady_clock::time_point started_;
+  Stopwatch watch_;  // of the phase
   std::int32_t lines_shown_ = 0;
   std::thread thread_;
 };

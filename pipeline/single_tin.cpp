@@ -2,23 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
 #include <limits>
 #include <memory>
 
 #include "formats/errors.h"
 #include "pipeline/estimate.h"
 #include "pipeline/process_memory.h"
+#include "pipeline/stopwatch.h"
 #include "scheduler/memory_budget.h"
 
 namespace qmpipe {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // Measured on DEMs of several million posts, rounded up: heights, flags, the method's own, the measure of
 // the error. Greedy insertion grows with its triangles; this covers a quarter of the full grid's.
@@ -101,17 +95,16 @@ SingleTin make_single_tin(const SingleTinOptions& options) {
   // First of all, before an hour's work shows that one is out of range.
   const TinMethod method = {options.method, options.stop,
                             values_at(options.parameters, options.method, options.stop, 0)};
-  const Clock::time_point start = Clock::now();
+  Stopwatch watch;
   const std::unique_ptr<RasterSource> source = RasterSource::open(
       options.input, {.crs_override = options.source_crs, .placing = Placing::kPlane});
   post_spacing(source->info());
   require_memory(options, source->info());
   SingleTin single;
   single.dem = read_dem(*source);
-  single.read_s = seconds_since(start);
-  const Clock::time_point read = Clock::now();
+  single.read_s = watch.lap();
   single.result = simplify_to_target(single.dem, method, options.target);
-  single.simplify_s = seconds_since(read);
+  single.simplify_s = watch.seconds();
   if (single.result.tin.indices.empty()) {
     throw IoError("cannot make a TIN of", options.input,
                   "its valid pixels are so few that every triangle is mostly void",

@@ -19,6 +19,7 @@
 #include "formats/tiered_lattice_store.h"
 #include "pipeline/block_cover.h"
 #include "pipeline/sampling_order.h"
+#include "pipeline/stopwatch.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
@@ -279,7 +280,7 @@ void Surveyor::survey_zoom(std::vector<BlockKey>& blocks, std::int32_t zoom) {
 }
 
 Survey Surveyor::run() {
-  const auto started = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   survey_.sources = describe_inputs(options_);
   survey_.scheme = options_.scheme;
   survey_.sampling_zoom = chosen_sampling_zoom(options_, survey_.sources);
@@ -296,8 +297,7 @@ Survey Surveyor::run() {
     survey_.store->seal();
     throw;
   }
-  survey_.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
+  survey_.seconds = watch.seconds();
   return std::move(survey_);
 }
 

@@ -5,13 +5,13 @@
 #pragma once
 
 #include <array>
-#include <chrono>
 #include <memory>
 #include <vector>
 
 #include "formats/gzip.h"
 #include "formats/quantized_mesh.h"
 #include "pipeline/recipe.h"
+#include "pipeline/stopwatch.h"
 #include "scheduler/wavefront.h"
 #include "stages/heightfield.h"
 #include "stages/tile_error.h"
@@ -66,17 +66,14 @@ class TileBuilder {
 class StageClock {
  public:
   StageClock(TileWork& work, Stage stage)
-      : seconds_(work.seconds.at(static_cast<std::size_t>(stage))),
-        started_(std::chrono::steady_clock::now()) {}
-  ~StageClock() {
-    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
-  }
+      : seconds_(work.seconds.at(static_cast<std::size_t>(stage))) {}
+  ~StageClock() { seconds_ += watch_.seconds(); }
   StageClock(const StageClock&) = delete;
   StageClock& operator=(const StageClock&) = delete;
 
  private:
   double& seconds_;
-  std::chrono::steady_clock::time_point started_;
+  Stopwatch watch_;
 };
 
 }  // namespace qmpipe

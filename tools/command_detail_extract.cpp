@@ -12,6 +12,7 @@
 #include "formats/mesh_export.h"
 #include "pipeline/detail_extract.h"
 #include "tools/detail_commands.h"
+#include "tools/parse_values.h"
 
 namespace qmpipe {
 namespace {
@@ -66,17 +67,6 @@ void require_one_choice(const ExtractArguments& arguments) {
   throw UsageError("give one of --svo, --triangles, --level, --distance and --eye");
 }
 
-bool wants_local(const ExtractArguments& arguments) {
-  const MeshFormat format = mesh_format_of(arguments.output);
-  if (arguments.frame == "local") return true;
-  if (format == MeshFormat::kGlb || format == MeshFormat::kStl) {
-    throw UsageError(
-        "--frame crs: the float32 of .glb and .stl is too coarse for the coordinates of a CRS; "
-        "write a .ply or .obj, or leave --frame out");
-  }
-  return false;
-}
-
 // From the middle of the box, at height 0.
 void make_local(ExportMesh& mesh) {
   std::array<double, 2> low = {mesh.positions_m.front()[0], mesh.positions_m.front()[1]};
@@ -128,7 +118,7 @@ void print_json(const DetailModel& model, const DetailLevels& levels, const Expo
 
 int run_extract(const ExtractArguments& arguments) {
   require_one_choice(arguments);
-  const bool is_local = wants_local(arguments);
+  const bool is_local = is_local_frame(arguments.frame, mesh_format_of(arguments.output));
   const DetailModel model = load_model(arguments.path);
   const DetailLevels levels = chosen_levels(arguments, model);
   auto mesh = extract_mesh(model, levels);

@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -14,6 +13,7 @@
 #include "formats/folders.h"
 #include "pipeline/process_memory.h"
 #include "pipeline/single_tin.h"
+#include "pipeline/stopwatch.h"
 #include "tools/method_arguments.h"
 #include "tools/parse_values.h"
 #include "tools/pyramid_arguments.h"
@@ -92,14 +92,8 @@ SingleTinOptions to_options(const TinArguments& arguments) {
 }
 
 TinFrame to_frame(const TinArguments& arguments) {
-  const MeshFormat format = mesh_format_of(arguments.output);
-  if (arguments.frame != "crs") return TinFrame::kLocal;
-  if (format == MeshFormat::kGlb || format == MeshFormat::kStl) {
-    throw UsageError(
-        "--frame crs: the float32 of .glb and .stl is too coarse for the coordinates of a CRS; "
-        "write a .ply or .obj, or leave --frame out");
-  }
-  return TinFrame::kCrs;
+  return is_local_frame(arguments.frame, mesh_format_of(arguments.output)) ? TinFrame::kLocal
+                                                                           : TinFrame::kCrs;
 }
 
 void print_effective(const TinArguments& arguments, const SingleTinOptions& options) {
@@ -220,12 +214,11 @@ int run_tin(const TinArguments& arguments) {
   for (const std::string& assumption : single.dem.info.assumptions) {
     fmt::print(stderr, "qmpipe: {}: {}\n", single.dem.info.path, assumption);
   }
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   write_mesh_file(arguments.output, mesh_of(single, frame));
-  const std::chrono::duration<double> write_time = std::chrono::steady_clock::now() - start;
-  const Written written{.path = arguments.output,
-                        .bytes = fs::file_size(arguments.output),
-                        .write_s = write_time.count()};
+  const double write_s = watch.seconds();
+  const Written written{
+      .path = arguments.output, .bytes = fs::file_size(arguments.output), .write_s = write_s};
   if (arguments.json) {
     print_json(options, single, written);
   } else {

@@ -71,4 +71,14 @@ std::map<std::int32_t, double> parse_tolerances(const std::string& text) {
   return tolerances;
 }
 
+bool is_local_frame(const std::string& frame, MeshFormat format) {
+  if (frame != "crs") return true;
+  if (format == MeshFormat::kGlb || format == MeshFormat::kStl) {
+    throw UsageError(
+        "--frame crs: the float32 of .glb and .stl is too coarse for the coordinates of a CRS; "
+        "write a .ply or .obj, or leave --frame out");
+  }
+  return false;
+}
+
 }  // namespace qmpipe

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "formats/errors.h"
+#include "formats/mesh_export.h"
 #include "formats/result.h"
 
 namespace qmpipe {
@@ -27,5 +28,9 @@ std::optional<int> parse_gzip(const std::string& text);
 
 // "8=20,9=10.5": a tolerance in metres for each zoom.
 std::map<std::int32_t, double> parse_tolerances(const std::string& text);
+
+// --frame, "local" or "crs", of a mesh to be written: whether it is local, which those of 32-bit floats
+// have to be.
+bool is_local_frame(const std::string& frame, MeshFormat format);
 
 }  // namespace qmpipe
