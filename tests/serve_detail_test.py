@@ -136,8 +136,8 @@ class ServeDetailTest(unittest.TestCase):
         page = self.server.get("/detail.html", Accept_Encoding="identity")
         self.assertEqual(start.body, page.body)
         self.assertIn(b"detail.js", start.body)
-        for path in ("/detail.js", "/detail_scene.js", "/detail_walk.js", "/three/three.module.js",
-                     "/three/three.core.js", "/three/OrbitControls.js"):
+        for path in ("/detail.js", "/detail_scene.js", "/detail_walk.js", "/detail_decoder.js",
+                     "/three/three.module.js", "/three/three.core.js", "/three/OrbitControls.js"):
             answer = self.server.get(path)
             self.assertEqual(answer.status, 200, path)
             self.assertTrue(answer.headers["Content-Type"].startswith("text/javascript"), path)

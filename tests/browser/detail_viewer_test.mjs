@@ -17,6 +17,8 @@ const patience = { timeout: 300000 };
 const size = 300;
 const model = join(work, 'model.h5');
 const pages = fileURLToPath(new URL('../../tools/viewer/', import.meta.url));
+const pageFiles = ['index.html', 'detail.html', 'detail.js', 'detail_scene.js', 'detail_walk.js',
+                   'detail_decoder.js'];
 
 let browser;
 
@@ -157,6 +159,34 @@ test('the sliders change the detail, the wireframe switch the picture', patience
   });
 });
 
+test('blocks are decoded beside the page, and the decoder ends with them', patience, async () => {
+  await withServer(model, async (address) => {
+    const { page, wrong } = await openPage(browser);
+    const workers = [];
+    page.on('worker', (worker) => workers.push(worker.url()));
+    await page.goto(address);
+    await settle(page);
+    assert.deepEqual(workers, [new URL('detail_decoder.js', address).href]);
+    assert.deepEqual(page.workers(), []);
+    assert.deepEqual(wrong, []);
+    await page.close();
+  });
+});
+
+test('a damaged part is told in words', patience, async () => {
+  await withServer(model, async (address) => {
+    const { page, wrong } = await openPage(browser);
+    await page.route('**/block/3.bin', async (route) => {
+      const response = await route.fetch();
+      await route.fulfill({ response, body: (await response.body()).subarray(0, -1) });
+    });
+    await page.goto(address);
+    await page.waitForSelector('text=the model is damaged: a part is too short');
+    assert.deepEqual(wrong, []);
+    await page.close();
+  });
+});
+
 test('a browser without WebGL is told so in words', patience, async () => {
   const blind = await launch('--disable-3d-apis');
   try {
@@ -174,7 +204,7 @@ test('a browser without WebGL is told so in words', patience, async () => {
 test('a server without three.js says how to get it', patience, async () => {
   const bare = join(work, 'pages');
   mkdirSync(bare, { recursive: true });
-  for (const name of ['index.html', 'detail.html', 'detail.js', 'detail_scene.js', 'detail_walk.js']) {
+  for (const name of pageFiles) {
     copyFileSync(join(pages, name), join(bare, name));
   }
   process.env.QMPIPE_VIEWER = bare;

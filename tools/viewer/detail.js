@@ -58,6 +58,29 @@ async function fetchPart(address) {
   return response;
 }
 
+// decodeBlock() of detail_walk.js, in a thread of its own.
+class Decoder {
+  constructor() {
+    this.worker = new Worker(new URL('./detail_decoder.js', import.meta.url), { type: 'module' });
+  }
+
+  // One at a time.
+  decode(buffer, size) {
+    return new Promise((resolve, reject) => {
+      this.worker.onerror = () => reject(new Plain('detail_decoder.js cannot be run.'));
+      this.worker.onmessage = ({ data: { block, error } }) => {
+        if (error) reject(new Plain(error));
+        else resolve(block);
+      };
+      this.worker.postMessage({ buffer, size }, [buffer]);
+    });
+  }
+
+  end() {
+    this.worker.terminate();
+  }
+}
+
 class Viewer {
   constructor(libraries, description) {
     Object.assign(this, { libraries, description });
@@ -199,14 +222,20 @@ class Viewer {
   }
 
   async load() {
-    const { decodeBlock, decodeSeams } = this.libraries;
+    const { decodeSeams } = this.libraries;
     const { blocks } = this.description;
+    const decoder = new Decoder();
+    const part = async (b) => (await fetchPart(`block/${b}.bin`)).arrayBuffer();
+    let coming = part(0);
     for (let b = 0; b < blocks.length; ++b) {
-      const part = await fetchPart(`block/${b}.bin`);
-      this.detail.addBlock(b, decodeBlock(await part.arrayBuffer(), blocks[b]));
+      const buffer = await coming;
+      // The next one is on its way while this one is decoded.
+      if (b + 1 < blocks.length) coming = part(b + 1);
+      this.detail.addBlock(b, await decoder.decode(buffer, blocks[b]));
       this.needsPicture = true;
       this.note(`block ${b + 1} of ${blocks.length} ...`);
     }
+    decoder.end();
     const seams = await fetchPart('seams.bin');
     this.seams = decodeSeams(await seams.arrayBuffer(), this.description);
     this.detail.addSeams(this.seams);
