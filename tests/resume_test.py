@@ -48,8 +48,8 @@ class ResumeTest(unittest.TestCase):
         cls = ResumeTest
         cls.root = pathlib.Path(folder)
         cls.dem = cls.root / "dem.tif"
-        done = subprocess.run([QMPIPE, "synth", "-o", cls.dem, "--size", "6400x4800", "--bounds",
-                               "6,44,10,47", "--seed", "3", "--voids", "0.02"],
+        done = subprocess.run([QMPIPE, "synth", "-o", cls.dem, "--size", "4800x3600", "--bounds",
+                               "6,44,9,46.25", "--seed", "3", "--voids", "0.02"],
                               capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         cls.reference = cls.root / "reference"
