@@ -163,6 +163,13 @@ bool leaves_degrees_alone(const CrsTransform& transform, std::span<const MapPoin
 
 }  // namespace
 
+struct RasterPlacement {
+  RasterCrs crs;
+  bool is_identity = false;
+  std::string transformation = {};
+  bool is_ballpark = false;
+};
+
 struct RasterSource::Impl {
   OpenedRaster opened;
   GDALRasterBand* band = nullptr;
@@ -181,7 +188,9 @@ struct RasterSource::Impl {
 
   void describe(const std::string& path);
   void place_in_plane(const RasterCrs& crs);
-  void place_on_globe(const RasterCrs& crs);
+  void make_transform(const RasterCrs& crs, std::span<const MapPoint> points);
+  RasterPlacement placed_on_globe(RasterCrs crs);
+  void place_on_globe(const RasterPlacement& placement);
   void measure();
   std::optional<PixelPoint> pixel_at(const LonLat& point) const;
   std::optional<LonLat> globe_at(const PixelPoint& point) const;
@@ -248,21 +257,38 @@ void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
   rule = height_rule_of(*band, crs, info);
 }
 
-void RasterSource::Impl::place_on_globe(const RasterCrs& crs) {
-  const std::vector<MapPoint> points = sample_points(affine, info);
+void RasterSource::Impl::make_transform(const RasterCrs& crs, std::span<const MapPoint> points) {
   transform = CrsTransform::make(crs.text, points);
-  if (!transform) {
-    throw IoError("cannot place the raster", info.path,
-                  "its CRS '" + crs.name + "' does not lead from the raster to the globe",
-                  "name the right one with --source-crs EPSG:n");
+  if (transform) return;
+  throw IoError("cannot place the raster", info.path,
+                "its CRS '" + crs.name + "' does not lead from the raster to the globe",
+                "name the right one with --source-crs EPSG:n");
+}
+
+RasterPlacement RasterSource::Impl::placed_on_globe(RasterCrs crs) {
+  const std::vector<MapPoint> points = sample_points(affine, info);
+  make_transform(crs, points);
+  RasterPlacement placement{.crs = std::move(crs),
+                            .transformation = transform->name(),
+                            .is_ballpark = transform->is_ballpark()};
+  placement.is_identity = placement.crs.is_geographic && leaves_degrees_alone(*transform, points);
+  return placement;
+}
+
+void RasterSource::Impl::place_on_globe(const RasterPlacement& placement) {
+  is_identity = placement.is_identity;
+  if (is_identity) {
+    // It holds a connection to PROJ's database, one for each raster.
+    transform.reset();
+  } else if (!transform) {
+    make_transform(placement.crs, sample_points(affine, info));
   }
-  info.transformation = transform->name();
-  if (transform->is_ballpark()) {
-    info.assumptions.push_back("no transformation is known from the datum of the CRS '" + crs.name +
-                               "' to WGS84; they are taken as the same");
+  info.transformation = placement.transformation;
+  if (placement.is_ballpark) {
+    info.assumptions.push_back("no transformation is known from the datum of the CRS '" +
+                               placement.crs.name + "' to WGS84; they are taken as the same");
   }
-  turn = crs.turn;
-  is_identity = crs.is_geographic && leaves_degrees_alone(*transform, points);
+  turn = placement.crs.turn;
   info.is_separable = is_identity && affine.is_axis_aligned();
   middle_x =
       affine.map_of({static_cast<double>(info.width) / 2, static_cast<double>(info.height) / 2}).x;
@@ -308,11 +334,18 @@ std::unique_ptr<RasterSource> RasterSource::open(const std::string& path,
   impl->opened = open_dataset(path);
   impl->describe(path);
   const bool on_globe = options.placing == Placing::kGlobe;
-  const RasterCrs crs = crs_of(*impl->opened.dataset, path, impl->opened.name, options.crs_override,
-                               on_globe ? CrsNeed::kRequired : CrsNeed::kOptional);
-  impl->place_in_plane(crs);
+  if (options.placement) {
+    impl->info.placement = options.placement;
+    impl->place_in_plane(options.placement->crs);
+  } else {
+    RasterCrs crs = crs_of(*impl->opened.dataset, path, impl->opened.name, options.crs_override,
+                           on_globe ? CrsNeed::kRequired : CrsNeed::kOptional);
+    impl->place_in_plane(crs);
+    impl->info.placement = std::make_shared<const RasterPlacement>(
+        on_globe ? impl->placed_on_globe(std::move(crs)) : RasterPlacement{.crs = std::move(crs)});
+  }
   if (on_globe) {
-    impl->place_on_globe(crs);
+    impl->place_on_globe(*impl->info.placement);
     impl->measure();
   }
   describe_blocks(*impl->band, impl->rule.has_mask, impl->info);
@@ -321,7 +354,7 @@ std::unique_ptr<RasterSource> RasterSource::open(const std::string& path,
 }
 
 std::optional<PixelPoint> RasterSource::pixel_at(double longitude_deg, double latitude_deg) const {
-  QMPIPE_CHECK(impl_->transform != nullptr);
+  QMPIPE_CHECK(impl_->info.pixel_deg > 0);
   return impl_->pixel_at({.longitude_deg = longitude_deg, .latitude_deg = latitude_deg});
 }
 

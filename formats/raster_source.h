@@ -48,6 +48,9 @@ struct PixelPlane {
   double unit = 1;
 };
 
+// What was found out about a raster's CRS, which takes ten times as long as to open the file.
+struct RasterPlacement;
+
 struct RasterInfo {
   std::string path;
   std::string driver;
@@ -87,6 +90,7 @@ struct RasterInfo {
   // What the file leaves open and was assumed, as sentences without a full stop ("the file names no
   // CRS; ..."); the program tells the user.
   std::vector<std::string> assumptions;
+  std::shared_ptr<const RasterPlacement> placement;
 };
 
 // On the globe every point must have a pixel; in the plane of its own CRS a raster needs no way from
@@ -104,6 +108,9 @@ struct OpenOptions {
   // The same for all handles on one file in one cache, and different for every file.
   std::uint32_t number = 0;
   Placing placing = Placing::kGlobe;
+  // What an earlier opening of the same raster found out, with the same crs_override and placing.
+  // DEFAULT: none, and it is found out.
+  std::shared_ptr<const RasterPlacement> placement = {};
 };
 
 class RasterSource {

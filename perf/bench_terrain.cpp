@@ -158,9 +158,7 @@ std::int64_t BenchDem::post_count() const {
 }
 
 std::unique_ptr<Sampler> open_sampler(const std::string& path, Resampling resampling) {
-  std::vector<std::unique_ptr<RasterSource>> sources;
-  sources.push_back(RasterSource::open(path));
-  return std::make_unique<Sampler>(std::move(sources), resampling);
+  return std::make_unique<Sampler>(testing::pool_of({path}), resampling);
 }
 
 std::vector<BenchTile> bench_tiles() {

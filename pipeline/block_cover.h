@@ -1,6 +1,7 @@
 // Which blocks of the lattice sources touch, zoom by zoom. Pure functions.
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <vector>
 
@@ -26,6 +27,7 @@ struct BlockSpan {
   std::int32_t first_y = 0;
   std::int32_t width = 0;
   std::int32_t height = 0;
+  friend auto operator<=>(const BlockSpan&, const BlockSpan&) = default;
 };
 
 // Every block in which the source may have a valid post.

@@ -216,7 +216,7 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
   to_survey.threads = memory.sampling_threads;
   const std::unique_ptr<TileSink> sink = open_sink(options, place);
   place_store(to_survey, share, options, place, progress);
-  const Survey survey = run_survey(to_survey, progress);
+  const Survey survey = run_survey(to_survey, sources, progress);
   give_back_freed_memory();
   require_data(survey);
   const BuildPlan plan = plan_build(options, survey);

@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
+#include <numeric>
 
 #include "formats/errors.h"
 #include "formats/hdf5_lattice_store.h"
 #include "formats/mbtiles.h"
+#include "formats/source_pool.h"
 #include "pipeline/block_cover.h"
 #include "pipeline/process_memory.h"
 #include "pipeline/sampling_order.h"
@@ -23,11 +26,17 @@ constexpr std::int64_t kIndexBytesPerBlock = 112;
 MemoryNeeds needs_of(const SurveyOptions& survey, const std::vector<RasterInfo>& sources,
                      std::int64_t limit_bytes) {
   MemoryNeeds needs{.threads = survey.threads};
+  // Every thread has its own handles, on as many sources at a time as it may have open.
+  std::vector<std::int64_t> handles;
   for (const RasterInfo& source : sources) {
     needs.source_block_bytes = std::max(needs.source_block_bytes, source.cached_block_bytes);
-    // Every thread has a handle on every source.
-    needs.source_handle_bytes += source.handle_bytes;
+    handles.push_back(source.handle_bytes);
   }
+  std::sort(handles.begin(), handles.end(), std::greater<>());
+  handles.resize(std::min(handles.size(), sources_open_at_once(survey.threads)));
+  needs.source_handle_bytes = std::accumulate(handles.begin(), handles.end(), std::int64_t{0});
+  // The first is among what every thread takes.
+  needs.source_handle_bytes += static_cast<std::int64_t>(handles.size() - 1) * kOpenSourceBytes;
   const Lattice lattice(survey.scheme, chosen_sampling_zoom(survey, sources));
   // The rest is better used for tiles in flight, and for the system's own cache of the files.
   needs.source_front_bytes =

@@ -9,9 +9,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <exception>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "formats/errors.h"
 #include "formats/hdf5_lattice_store.h"
@@ -29,15 +32,12 @@ constexpr std::size_t kManyTiles = 2000;
 constexpr std::size_t kBlockSize = static_cast<std::size_t>(kBlockPosts) * kBlockPosts;
 
 std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options,
+                                      const std::shared_ptr<const std::vector<RasterInfo>>& sources,
                                       const std::shared_ptr<SourceBlockCache>& cache) {
-  std::vector<std::unique_ptr<RasterSource>> sources;
-  for (const std::string& input : options.inputs) {
-    sources.push_back(
-        RasterSource::open(input, {.crs_override = options.source_crs,
-                                   .cache = cache,
-                                   .number = static_cast<std::uint32_t>(sources.size())}));
-  }
-  return std::make_unique<Sampler>(std::move(sources), options.resampling);
+  return std::make_unique<Sampler>(
+      SourcePool(sources, {.crs_override = options.source_crs, .cache = cache},
+                 sources_open_at_once(options.threads)),
+      options.resampling);
 }
 
 // Runs body(k) for 0 <= k < count on the arena's threads, which take one k after the other, so that
@@ -76,8 +76,10 @@ void keep_present(const LatticeStore& store, std::vector<BlockKey>& blocks) {
 
 class Surveyor {
  public:
-  Surveyor(const SurveyOptions& options, Progress& progress)
-      : options_(options), progress_(progress), arena_(options.threads) {}
+  Surveyor(const SurveyOptions& options, std::vector<RasterInfo> sources, Progress& progress)
+      : options_(options), progress_(progress), arena_(options.threads) {
+    survey_.sources = std::move(sources);
+  }
 
   Survey run();
 
@@ -108,9 +110,10 @@ void Surveyor::sample(std::vector<BlockKey>& blocks) {
   std::vector<BlockKey> order = blocks;
   sort_for_sampling(
       order, widest_strip(lattice, survey_.sources, options_.threads, options_.source_cache_bytes));
-  // GDAL's datasets belong to one thread; each opens its own when it first has work.
+  const auto sources = std::make_shared<const std::vector<RasterInfo>>(survey_.sources);
+  // GDAL's datasets belong to one thread; each opens its own.
   tbb::enumerable_thread_specific<std::unique_ptr<Sampler>> samplers(
-      [&] { return open_sampler(options_, cache); });
+      [&] { return open_sampler(options_, sources, cache); });
   const Phase phase(progress_, "survey", "posts",
                     static_cast<std::int64_t>(blocks.size() * kBlockSize));
   for_each_in_order(arena_, options_.threads, order.size(), [&](std::size_t k) {
@@ -281,7 +284,6 @@ void Surveyor::survey_zoom(std::vector<BlockKey>& blocks, std::int32_t zoom) {
 
 Survey Surveyor::run() {
   const Stopwatch watch;
-  survey_.sources = describe_inputs(options_);
   survey_.scheme = options_.scheme;
   survey_.sampling_zoom = chosen_sampling_zoom(options_, survey_.sources);
   survey_.max_zoom = options_.max_zoom < 0 ? survey_.sampling_zoom : options_.max_zoom;
@@ -311,16 +313,31 @@ std::int32_t chosen_sampling_zoom(const SurveyOptions& options,
 
 std::vector<RasterInfo> describe_inputs(const SurveyOptions& options) {
   if (options.inputs.empty()) throw UsageError("no input: name at least one raster");
-  std::vector<RasterInfo> infos;
-  for (const std::string& input : options.inputs) {
-    infos.push_back(RasterSource::open(input, {.crs_override = options.source_crs})->info());
-  }
+  std::vector<RasterInfo> infos(options.inputs.size());
+  // The first input that cannot be used is told, whichever thread met one first.
+  std::vector<std::exception_ptr> errors(infos.size());
+  std::atomic<std::size_t> first_wrong = infos.size();
+  tbb::task_arena arena(options.threads);
+  for_each_in_order(arena, options.threads, infos.size(), [&](std::size_t k) {
+    if (k > first_wrong) return;
+    try {
+      infos[k] =
+          RasterSource::open(options.inputs[k], {.crs_override = options.source_crs})->info();
+    } catch (...) {
+      errors[k] = std::current_exception();
+      std::size_t before = first_wrong;
+      while (k < before && !first_wrong.compare_exchange_weak(before, k)) {
+      }
+    }
+  });
+  if (first_wrong < infos.size()) std::rethrow_exception(errors[first_wrong]);
   return infos;
 }
 
-Survey run_survey(const SurveyOptions& options, Progress& progress) {
+Survey run_survey(const SurveyOptions& options, std::vector<RasterInfo> sources,
+                  Progress& progress) {
   QMPIPE_CHECK(options.threads >= 1);
-  return Surveyor(options, progress).run();
+  return Surveyor(options, std::move(sources), progress).run();
 }
 
 }  // namespace qmpipe

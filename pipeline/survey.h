@@ -69,6 +69,8 @@ std::int32_t chosen_sampling_zoom(const SurveyOptions& options,
 // there is none.
 std::vector<RasterInfo> describe_inputs(const SurveyOptions& options);
 
-Survey run_survey(const SurveyOptions& options, Progress& progress);
+// `sources`: what describe_inputs() told.
+Survey run_survey(const SurveyOptions& options, std::vector<RasterInfo> sources,
+                  Progress& progress);
 
 }  // namespace qmpipe

@@ -52,8 +52,11 @@ class SurveyedPosts final : public SourcePosts {
 
 class SampledPosts final : public SourcePosts {
  public:
-  SampledPosts(const SourceOptions& options, const TilingScheme& scheme)
-      : scheme_(scheme), samplers_([options] { return open_sampler(options); }) {}
+  SampledPosts(const SourceOptions& options, std::vector<RasterInfo> sources,
+               const TilingScheme& scheme)
+      : sources_(std::make_shared<const std::vector<RasterInfo>>(std::move(sources))),
+        scheme_(scheme),
+        samplers_([this, options] { return open_sampler(options); }) {}
 
   std::optional<WindowHeights> posts(const TileKey& key) const override {
     const Lattice lattice(scheme_, key.zoom);
@@ -72,14 +75,13 @@ class SampledPosts final : public SourcePosts {
   std::vector<TileKey> expected_tiles() const override { return {}; }
 
  private:
-  static std::unique_ptr<Sampler> open_sampler(const SourceOptions& options) {
-    std::vector<std::unique_ptr<RasterSource>> sources;
-    for (const std::string& input : options.inputs) {
-      sources.push_back(RasterSource::open(input, {.crs_override = options.source_crs}));
-    }
-    return std::make_unique<Sampler>(std::move(sources), Resampling::kBilinear);
+  std::unique_ptr<Sampler> open_sampler(const SourceOptions& options) const {
+    return std::make_unique<Sampler>(SourcePool(sources_, {.crs_override = options.source_crs},
+                                                sources_open_at_once(options.threads)),
+                                     Resampling::kBilinear);
   }
 
+  std::shared_ptr<const std::vector<RasterInfo>> sources_;
   TilingScheme scheme_;
   // A sampler belongs to one thread; each thread opens its own when it first needs it.
   mutable tbb::enumerable_thread_specific<std::unique_ptr<Sampler>> samplers_;
@@ -95,8 +97,8 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
   survey.threads = options.threads;
   if (recipe && survey.source_crs.empty()) survey.source_crs = recipe->source_crs;
   // An input that cannot be opened is told before work starts.
-  const std::vector<RasterInfo> sources = describe_inputs(survey);
-  if (!recipe) return std::make_unique<SampledPosts>(options, scheme);
+  std::vector<RasterInfo> sources = describe_inputs(survey);
+  if (!recipe) return std::make_unique<SampledPosts>(options, std::move(sources), scheme);
   survey.resampling = recipe->resampling;
   survey.reduction = recipe->reduction;
   survey.scheme = scheme;
@@ -112,7 +114,7 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
     progress.note(fmt::format("the lattice is kept in {}: at most {} of disk",
                               survey.store_folder.string(), bytes_text(share.store_bytes)));
   }
-  Survey surveyed = run_survey(survey, progress);
+  Survey surveyed = run_survey(survey, std::move(sources), progress);
   return std::make_unique<SurveyedPosts>(*recipe, std::move(surveyed), std::move(scratch));
 }
 

@@ -40,11 +40,24 @@ struct Strip {
   }
 };
 
+bool is_full(const Strip& block) {
+  const auto width = static_cast<std::size_t>(block.posts.width_posts);
+  const auto height = static_cast<std::size_t>(block.posts.height_posts);
+  for (std::size_t r = 0; r < height; ++r) {
+    const std::span<const float> row = block.row(r, 0, width);
+    if (std::any_of(row.begin(), row.end(), [](float h) { return std::isnan(h); })) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 struct Sampler::Impl {
-  std::vector<std::unique_ptr<RasterSource>> sources;
-  Resampling resampling = Resampling::kBilinear;
+  explicit Impl(SourcePool pool, Resampling method)
+      : sources(std::move(pool)), resampling(method) {}
+
+  SourcePool sources;
+  Resampling resampling;
   // Buffers kept between calls.
   std::vector<PixelPoint> places;
   std::vector<double> pixels;
@@ -150,12 +163,6 @@ void Sampler::Impl::sample_block(const RasterSource& source, const Lattice& latt
                                  const Strip& block) {
   const auto width = static_cast<std::size_t>(block.posts.width_posts);
   const auto height = static_cast<std::size_t>(block.posts.height_posts);
-  bool is_full = true;
-  for (std::size_t r = 0; r < height && is_full; ++r) {
-    const std::span<const float> row = block.row(r, 0, width);
-    is_full = std::none_of(row.begin(), row.end(), [](float h) { return std::isnan(h); });
-  }
-  if (is_full) return;
   places.resize(block.posts.size());
   locate_posts(source, lattice, block.posts, places);
   for (std::size_t r = 0; r < height; ++r) {
@@ -184,8 +191,10 @@ void Sampler::Impl::sample_strip(const Lattice& lattice, const Strip& strip) {
                             .j0 = posts.j0,
                             .i1 = posts.i0 + posts.width_posts - 1,
                             .j1 = posts.j0 + posts.height_posts - 1};
-      for (const std::unique_ptr<RasterSource>& source : sources) {
-        if (touches_bounds(source->info(), lattice, range)) sample_block(*source, lattice, block);
+      for (std::size_t k = 0; k < sources.size(); ++k) {
+        if (!touches_bounds(sources.info(k), lattice, range)) continue;
+        if (is_full(block)) break;
+        sample_block(sources.source(k), lattice, block);
       }
     }
   }
@@ -212,11 +221,9 @@ float Sampler::Impl::pole_height_m(const Lattice& lattice, std::int32_t j) {
   return mean;
 }
 
-Sampler::Sampler(std::vector<std::unique_ptr<RasterSource>> sources, Resampling resampling)
-    : impl_(std::make_unique<Impl>()) {
-  QMPIPE_CHECK(!sources.empty());
-  impl_->sources = std::move(sources);
-  impl_->resampling = resampling;
+Sampler::Sampler(SourcePool sources, Resampling resampling) {
+  QMPIPE_CHECK(sources.size() > 0);
+  impl_ = std::make_unique<Impl>(std::move(sources), resampling);
 }
 
 Sampler::~Sampler() = default;
@@ -255,9 +262,10 @@ bool Sampler::may_cover(const Lattice& lattice, const PostWindow& window) const 
                         .i1 = window.i0 + window.width_posts - 1,
                         .j1 = std::min(window.j0 + window.height_posts, lattice.rows()) - 1};
   if (range.j0 > range.j1) return false;
-  return std::any_of(impl_->sources.begin(), impl_->sources.end(), [&](const auto& source) {
-    return touches_bounds(source->info(), lattice, range);
-  });
+  for (std::size_t k = 0; k < impl_->sources.size(); ++k) {
+    if (touches_bounds(impl_->sources.info(k), lattice, range)) return true;
+  }
+  return false;
 }
 
 std::int32_t sampling_zoom_for(const TilingScheme& scheme, std::span<const RasterInfo> sources) {

@@ -13,9 +13,9 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "formats/raster_source.h"
+#include "formats/source_pool.h"
 #include "scheduler/lattice.h"
 #include "stages/resampling.h"
 
@@ -24,7 +24,7 @@ namespace qmpipe {
 class Sampler {
  public:
   // REQUIRES: at least one source.
-  Sampler(std::vector<std::unique_ptr<RasterSource>> sources, Resampling resampling);
+  Sampler(SourcePool sources, Resampling resampling);
   ~Sampler();
   Sampler(Sampler&&) noexcept;
 

@@ -124,6 +124,12 @@ std::vector<double> read_all(const RasterSource& source) {
   return heights;
 }
 
+SourcePool pool_of(const std::vector<std::string>& paths) {
+  std::vector<RasterInfo> infos;
+  for (const std::string& path : paths) infos.push_back(RasterSource::open(path)->info());
+  return {std::make_shared<const std::vector<RasterInfo>>(std::move(infos)), {}, paths.size()};
+}
+
 std::optional<std::string> real_data(const std::string& name) {
   const char* folder = std::getenv("QMPIPE_DATA");
   const fs::path path =

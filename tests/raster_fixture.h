@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "formats/raster_source.h"
+#include "formats/source_pool.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe::testing {
@@ -49,6 +50,8 @@ void copy_raster(const std::string& from, const std::string& to, const std::stri
 
 std::unique_ptr<RasterSource> open_fixture(const std::string& path, const RasterFixture& fixture);
 std::vector<double> read_all(const RasterSource& source);
+// All may be open at once.
+SourcePool pool_of(const std::vector<std::string>& paths);
 
 // A real DEM, or nothing where the data is absent (QMPIPE_DATA, else ../shared/data).
 std::optional<std::string> real_data(const std::string& name);

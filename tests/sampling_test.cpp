@@ -17,9 +17,7 @@ const TilingScheme kGeodetic(Projection::kGeodetic);
 
 Sampler sampler_of(const std::vector<std::string>& paths,
                    Resampling resampling = Resampling::kBilinear) {
-  std::vector<std::unique_ptr<RasterSource>> sources;
-  for (const std::string& path : paths) sources.push_back(RasterSource::open(path));
-  return {std::move(sources), resampling};
+  return {pool_of(paths), resampling};
 }
 
 std::vector<float> sampled(Sampler& sampler, const Lattice& lattice, const PostWindow& window) {

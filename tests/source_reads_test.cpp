@@ -34,8 +34,9 @@ Survey survey_of(const std::string& path, std::int32_t threads, std::int64_t cac
   // More threads than the machine has cores, as in a build.
   const tbb::global_control workers(tbb::global_control::max_allowed_parallelism, 8);
   Progress progress(ProgressStyle::kSilent, nullptr);
-  return run_survey({.inputs = {path}, .threads = threads, .source_cache_bytes = cache_bytes},
-                    progress);
+  const SurveyOptions options{
+      .inputs = {path}, .threads = threads, .source_cache_bytes = cache_bytes};
+  return run_survey(options, describe_inputs(options), progress);
 }
 
 std::int64_t comfortable_bytes(const std::string& path, std::int32_t threads) {
@@ -64,10 +65,8 @@ std::vector<float> posts_of(const Survey& survey) {
 std::vector<float> sampled_posts(const std::string& path, const Survey& survey) {
   const Lattice lattice(survey.scheme, survey.sampling_zoom);
   const PostWindow window = window_around(lattice);
-  std::vector<std::unique_ptr<RasterSource>> sources;
-  sources.push_back(RasterSource::open(path));
   std::vector<float> heights_m(window.size());
-  Sampler(std::move(sources), Resampling::kBilinear).sample(lattice, window, heights_m);
+  Sampler(testing::pool_of({path}), Resampling::kBilinear).sample(lattice, window, heights_m);
   return heights_m;
 }
 
