@@ -19,9 +19,10 @@ constexpr std::int64_t kFilesPerSource = 3;
 constexpr std::int64_t kFewSources = 4;
 constexpr std::int64_t kManySources = 64;
 
+// The CRS is taken over from the first opening, and what that was is not looked at again.
 bool is_the_same(const RasterInfo& a, const RasterInfo& b) {
   return a.width == b.width && a.height == b.height && a.block_width == b.block_width &&
-         a.block_height == b.block_height && a.type_name == b.type_name && a.crs_wkt == b.crs_wkt &&
+         a.block_height == b.block_height && a.type_name == b.type_name &&
          a.bounds_deg == b.bounds_deg;
 }
 

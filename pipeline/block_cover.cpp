@@ -68,14 +68,11 @@ BlockSpan covered_span(const Lattice& lattice, const RasterInfo& source) {
 
 std::vector<BlockKey> covered_blocks(const TilingScheme& scheme, std::int32_t zoom,
                                      const std::vector<RasterInfo>& sources) {
-  const Lattice lattice(scheme, zoom);
-  const std::int32_t columns = scheme.columns(zoom);
   std::set<BlockKey> blocks;
-  for (const RasterInfo& source : sources) {
-    const BlockSpan span = covered_span(lattice, source);
+  for (const BlockSpan& span : spans_of(scheme, zoom, sources)) {
     for (std::int32_t y = span.first_y; y < span.first_y + span.height; ++y) {
       for (std::int32_t x = span.first_x; x < span.first_x + span.width; ++x) {
-        blocks.insert({.zoom = zoom, .x = (x % columns + columns) % columns, .y = y});
+        blocks.insert({.zoom = zoom, .x = x, .y = y});
       }
     }
   }

@@ -41,7 +41,8 @@ SurveyOptions survey_options(const BuildOptions& options) {
           .scheme = TilingScheme(options.mesh.projection),
           .sampling_zoom = -1,
           .max_zoom = options.mesh.max_zoom.value_or(-1),
-          .threads = options.run.threads};
+          .threads = options.run.threads,
+          .open_sources = sources_open_at_once(options.run.threads)};
 }
 
 // Tells what the sources leave open, so that a wrong guess does not go unnoticed.

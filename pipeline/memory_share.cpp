@@ -33,7 +33,7 @@ MemoryNeeds needs_of(const SurveyOptions& survey, const std::vector<RasterInfo>&
     handles.push_back(source.handle_bytes);
   }
   std::sort(handles.begin(), handles.end(), std::greater<>());
-  handles.resize(std::min(handles.size(), sources_open_at_once(survey.threads)));
+  handles.resize(std::min(handles.size(), survey.open_sources));
   needs.source_handle_bytes = std::accumulate(handles.begin(), handles.end(), std::int64_t{0});
   // The first is among what every thread takes.
   needs.source_handle_bytes += static_cast<std::int64_t>(handles.size() - 1) * kOpenSourceBytes;

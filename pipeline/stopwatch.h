@@ -11,10 +11,9 @@ class Stopwatch {
   double seconds() const { return std::chrono::duration<double>(Clock::now() - started_).count(); }
   // The same, and starts again.
   double lap() {
-    const Clock::time_point now = Clock::now();
-    const double seconds = std::chrono::duration<double>(now - started_).count();
-    started_ = now;
-    return seconds;
+    const double passed_s = seconds();
+    started_ = Clock::now();
+    return passed_s;
   }
 
  private:

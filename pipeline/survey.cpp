@@ -36,7 +36,7 @@ std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options,
                                       const std::shared_ptr<SourceBlockCache>& cache) {
   return std::make_unique<Sampler>(
       SourcePool(sources, {.crs_override = options.source_crs, .cache = cache},
-                 sources_open_at_once(options.threads)),
+                 options.open_sources),
       options.resampling);
 }
 

@@ -16,6 +16,7 @@
 
 #include "formats/lattice_store.h"
 #include "formats/raster_source.h"
+#include "formats/source_pool.h"
 #include "formats/survey_file.h"
 #include "pipeline/progress.h"
 #include "pipeline/run_record.h"
@@ -36,6 +37,8 @@ struct SurveyOptions {
   // Deepest zoom for which tiles are listed; -1: the sampling zoom.
   std::int32_t max_zoom = -1;
   std::int32_t threads = 1;
+  // How many sources each of the threads may have open.
+  std::size_t open_sources = sources_open_at_once(1);
   // Deeper zooms than this are kept on disk, compressed; -1 keeps all there. DEFAULT: all in memory.
   std::int32_t last_memory_zoom = kMaxZoom;
   // Where the store on disk lives; needed when a zoom is kept there. Empty, or the record's folder.

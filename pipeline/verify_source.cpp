@@ -95,6 +95,7 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
                                                Progress& progress) {
   SurveyOptions survey = {.inputs = options.inputs, .source_crs = options.source_crs};
   survey.threads = options.threads;
+  survey.open_sources = sources_open_at_once(options.threads);
   if (recipe && survey.source_crs.empty()) survey.source_crs = recipe->source_crs;
   // An input that cannot be opened is told before work starts.
   std::vector<RasterInfo> sources = describe_inputs(survey);

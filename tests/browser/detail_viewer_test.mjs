@@ -17,8 +17,6 @@ const patience = { timeout: 300000 };
 const size = 300;
 const model = join(work, 'model.h5');
 const pages = fileURLToPath(new URL('../../tools/viewer/', import.meta.url));
-const pageFiles = ['index.html', 'detail.html', 'detail.js', 'detail_scene.js', 'detail_walk.js',
-                   'detail_decoder.js'];
 
 let browser;
 
@@ -104,6 +102,8 @@ test('triangles come and go with the distance, and no block tears off another', 
                                      at: [1000, 1000, 1000] });
     assert(new Set(state.levels).size > 1, `${state.levels}`);
     assert.equal(await openEdges(page), rim);
+    // A look around, so that there are frames to judge however few of them the walks took.
+    for (const heading of [135, 225, 315]) await look(page, { heading, pitch: -20, range: 2500 });
     const frames = await page.evaluate(() => window.qmpipe.frames);
     assert(frames.length > 10);
     const sorted = frames.map(({ work_ms: ms }) => ms).sort((a, b) => a - b);
@@ -204,7 +204,8 @@ test('a browser without WebGL is told so in words', patience, async () => {
 test('a server without three.js says how to get it', patience, async () => {
   const bare = join(work, 'pages');
   mkdirSync(bare, { recursive: true });
-  for (const name of pageFiles) {
+  for (const name of ['index.html', 'detail.html', 'detail.js', 'detail_scene.js',
+                      'detail_walk.js', 'detail_decoder.js']) {
     copyFileSync(join(pages, name), join(bare, name));
   }
   process.env.QMPIPE_VIEWER = bare;
