@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "formats/row_order.h"
 #include "formats/tile_set.h"
 #include "formats/tile_sink.h"
 
@@ -43,10 +44,8 @@ std::unique_ptr<TileSink> open_mbtiles_sink(const std::filesystem::path& path, O
 // when the working file is not ours or damaged.
 std::unique_ptr<TileSink> resume_mbtiles_sink(const std::filesystem::path& path);
 
-// How a file numbers its rows; ours and the specification's is kTms.
-enum class RowOrder { kTms, kXyz };
-
-// Reads any program's MBTiles; layer_text() is the metadata's `layer.json` (or `layer_json`).
+// Reads any program's MBTiles; layer_text() is the metadata's `layer.json` (or `layer_json`). The
+// specification numbers rows as kTms.
 // Throws IoError when it is no MBTiles file. A damaged file never crashes the program.
 std::unique_ptr<TileSet> open_mbtiles_set(const std::filesystem::path& path,
                                           RowOrder rows = RowOrder::kTms);

@@ -16,15 +16,13 @@
 #include "formats/gdal_session.h"
 #include "formats/height_unit.h"
 #include "formats/little_endian.h"
+#include "formats/raster_dataset.h"
 
 namespace qmpipe {
 namespace {
 
 constexpr char kRemedy[] = "say which one it is with --source-crs EPSG:n";
 
-struct CloseDataset {
-  void operator()(GDALDataset* dataset) const { GDALClose(dataset); }
-};
 using Dataset = std::unique_ptr<GDALDataset, CloseDataset>;
 
 template <class T>

@@ -19,23 +19,23 @@ using Bytes = SourceBlockCache::Bytes;
 // Many threads ask for the strips of a file hundreds of times per block of posts.
 constexpr std::size_t kShards = 16;
 
-struct BlockKey {
+struct SourceBlockKey {
   std::uint32_t source = 0;
   std::int64_t index = 0;
-  bool operator==(const BlockKey&) const = default;
+  bool operator==(const SourceBlockKey&) const = default;
   // Neighbours in a file are in different shards.
   std::size_t shard() const { return (static_cast<std::size_t>(index) + source) % kShards; }
 };
 
-struct BlockKeyHash {
-  std::size_t operator()(const BlockKey& key) const {
+struct SourceBlockKeyHash {
+  std::size_t operator()(const SourceBlockKey& key) const {
     return (static_cast<std::size_t>(key.index) + (static_cast<std::size_t>(key.source) << 40U)) *
            0x9E3779B97F4A7C15ULL;
   }
 };
 
 struct Entry {
-  BlockKey key;
+  SourceBlockKey key;
   std::shared_ptr<const Bytes> bytes;  // null while a thread decodes it
   std::uint64_t asked_at = 0;
 };
@@ -47,13 +47,13 @@ struct SourceBlockCache::Impl {
     std::mutex mutex;
     std::condition_variable ready;
     std::list<Entry> entries;  // last asked for first
-    std::unordered_map<BlockKey, std::list<Entry>::iterator, BlockKeyHash> index;
+    std::unordered_map<SourceBlockKey, std::list<Entry>::iterator, SourceBlockKeyHash> index;
     // By source: which blocks of this shard were decoded before.
     std::unordered_map<std::uint32_t, std::vector<bool>> known;
 
     // REQUIRES for all: the mutex is held.
     std::list<Entry>::iterator oldest_idle();
-    bool note_first(const BlockKey& key);
+    bool note_first(const SourceBlockKey& key);
     void erase(std::list<Entry>::iterator entry);
   };
 
@@ -77,7 +77,7 @@ struct SourceBlockCache::Impl {
 // A block that this thread decodes; when that fails, the block is as if nobody had asked for it.
 class SourceBlockCache::Impl::Claim {
  public:
-  Claim(Impl& cache, Shard& shard, BlockKey key, std::int64_t size_bytes)
+  Claim(Impl& cache, Shard& shard, SourceBlockKey key, std::int64_t size_bytes)
       : cache_(cache), shard_(shard), key_(key), size_bytes_(size_bytes) {}
   ~Claim() {
     if (is_kept_) return;
@@ -114,7 +114,7 @@ class SourceBlockCache::Impl::Claim {
  private:
   Impl& cache_;
   Shard& shard_;
-  BlockKey key_;
+  SourceBlockKey key_;
   std::int64_t size_bytes_;
   bool is_counted_ = false;
   bool is_kept_ = false;
@@ -130,7 +130,7 @@ std::list<Entry>::iterator SourceBlockCache::Impl::Shard::oldest_idle() {
   return entries.end();
 }
 
-bool SourceBlockCache::Impl::Shard::note_first(const BlockKey& key) {
+bool SourceBlockCache::Impl::Shard::note_first(const SourceBlockKey& key) {
   std::vector<bool>& marks = known[key.source];
   const std::size_t at = static_cast<std::size_t>(key.index) / kShards;
   if (at >= marks.size()) marks.resize(at + 1);
@@ -179,7 +179,7 @@ SourceBlockCache::~SourceBlockCache() = default;
 std::shared_ptr<const Bytes> SourceBlockCache::get(
     const Request& request, const std::function<void(std::span<std::uint8_t>)>& decode) {
   QMPIPE_CHECK(request.index >= 0 && request.size_bytes > 0 && request.file_blocks > 0);
-  const BlockKey key{.source = request.source, .index = request.index};
+  const SourceBlockKey key{.source = request.source, .index = request.index};
   Impl::Shard& shard = impl_->shards[key.shard()];
   {
     std::unique_lock lock(shard.mutex);

@@ -107,7 +107,7 @@ class LayerCheck {
     if (!root_.contains("scheme")) return;
     const std::string& scheme = layer_.parsed.scheme;
     if (scheme == "slippyMap") {
-      layer_.row_order = RowOrder::kFromNorth;
+      layer_.row_order = RowOrder::kXyz;
       add(CheckKind::kSchemeNotTms,
           "\"scheme\" is \"slippyMap\"; the specification knows \"tms\" only");
     } else if (scheme != "tms") {
@@ -225,7 +225,7 @@ Result<WebAddress> tile_address(const ServedLayer& layer, const WebAddress& fold
   const auto sum = static_cast<std::size_t>(key.x) + static_cast<std::size_t>(key.y) +
                    static_cast<std::size_t>(key.zoom);
   TileKey written = key;
-  if (layer.row_order == RowOrder::kFromNorth) {
+  if (layer.row_order == RowOrder::kXyz) {
     written.y = layer.scheme.rows(key.zoom) - 1 - key.y;
   }
   return resolve(folder, fill_template(templates[sum % templates.size()],

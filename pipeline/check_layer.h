@@ -7,19 +7,18 @@
 #include <vector>
 
 #include "formats/layer_json.h"
+#include "formats/row_order.h"
 #include "pipeline/check_finding.h"
 #include "pipeline/web_address.h"
 #include "scheduler/tiling_scheme.h"
 
 namespace qmpipe {
 
-// How rows are counted in the tiles' addresses; "available" counts from the south in either case.
-enum class RowOrder : std::uint8_t { kFromSouth, kFromNorth };
-
 struct ServedLayer {
   ParsedLayerJson parsed;
   TilingScheme scheme{Projection::kGeodetic};
-  RowOrder row_order = RowOrder::kFromSouth;
+  // Of the tiles' addresses; "available" counts from the south in either case.
+  RowOrder row_order = RowOrder::kTms;
   // Sound ranges of zooms that viewers ask for, by zoom; empty with metadataAvailability.
   std::vector<std::vector<TileRange>> available;
   // Why no tile can be asked for: a fault was told.

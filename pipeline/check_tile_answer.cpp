@@ -131,14 +131,14 @@ TileKey mirrored(const TilingScheme& scheme, const TileKey& key) {
   return {.zoom = key.zoom, .x = key.x, .y = scheme.rows(key.zoom) - 1 - key.y};
 }
 
-TilePlace place_of_tile(const TilingScheme& scheme, const TileKey& key,
-                        const QuantizedMeshHeader& header) {
+Whereabouts place_of_tile(const TilingScheme& scheme, const TileKey& key,
+                          const QuantizedMeshHeader& header) {
   QMPIPE_CHECK(scheme.contains(key));
   const double here = distance_radii(scheme.rectangle_deg(key), header);
   const double mirrored_row = distance_radii(scheme.rectangle_deg(mirrored(scheme, key)), header);
   // The spheres of low zooms reach into their mirrors: the nearer one counts there.
-  if (mirrored_row <= 1 && mirrored_row < here / 2) return TilePlace::kMirroredRow;
-  return here <= 1 ? TilePlace::kHere : TilePlace::kElsewhere;
+  if (mirrored_row <= 1 && mirrored_row < here / 2) return Whereabouts::kMirroredRow;
+  return here <= 1 ? Whereabouts::kHere : Whereabouts::kElsewhere;
 }
 
 }  // namespace qmpipe

@@ -15,7 +15,7 @@ namespace qmpipe {
 std::optional<QuantizedMesh> check_tile_body(const ServedLayer& layer, const TileKey& key,
                                              const HttpAnswer& answer, CheckLog& log);
 
-enum class TilePlace : std::uint8_t {
+enum class Whereabouts : std::uint8_t {
   kHere,
   kMirroredRow,  // where the tile of the row as far from the north lies
   kElsewhere
@@ -24,8 +24,8 @@ enum class TilePlace : std::uint8_t {
 // and not be nearer to the mirrored row's. Tiles that reach around half of the globe (roots,
 // and zoom 1 of EPSG:3857) are not told apart.
 // REQUIRES: a key in the scheme.
-TilePlace place_of_tile(const TilingScheme& scheme, const TileKey& key,
-                        const QuantizedMeshHeader& header);
+Whereabouts place_of_tile(const TilingScheme& scheme, const TileKey& key,
+                          const QuantizedMeshHeader& header);
 
 // The same column, the row as far from the north as the key's is from the south.
 TileKey mirrored(const TilingScheme& scheme, const TileKey& key);

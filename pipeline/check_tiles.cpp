@@ -30,14 +30,14 @@ std::string accept_header(const ServedLayer& layer) {
                      offered.empty() ? "" : ";extensions=", fmt::join(offered, "-"));
 }
 
-HttpRequest request_of(const AskingPage& page, const WebAddress& address,
-                       const std::string& accept) {
+HttpQuestion request_of(const AskingPage& page, const WebAddress& address,
+                        const std::string& accept) {
   // Nothing but gzip is offered, so that whatever comes can be read.
-  HttpRequest request = {.method = HttpMethod::kGet,
-                         .url = address.text(),
-                         .headers = {{.name = "Accept", .value = accept},
-                                     {.name = "Accept-Encoding", .value = "gzip"}},
-                         .limit_bytes = 0};
+  HttpQuestion request = {.method = HttpMethod::kGet,
+                          .url = address.text(),
+                          .headers = {{.name = "Accept", .value = accept},
+                                      {.name = "Accept-Encoding", .value = "gzip"}},
+                          .limit_bytes = 0};
   if (page.origin != address.origin()) {
     request.headers.push_back({.name = "Origin", .value = page.origin});
   }
@@ -62,13 +62,13 @@ bool can_be_cached(const HttpAnswer& answer) {
 
 Result<HttpAnswer> Asker::get(const WebAddress& address, const std::string& accept,
                               std::size_t limit_bytes) const {
-  HttpRequest request = request_of(page, address, accept);
+  HttpQuestion request = request_of(page, address, accept);
   request.limit_bytes = limit_bytes;
   return fetch(request);
 }
 
 Result<HttpAnswer> Asker::head(const WebAddress& address, const std::string& accept) const {
-  HttpRequest request = request_of(page, address, accept);
+  HttpQuestion request = request_of(page, address, accept);
   request.method = HttpMethod::kHead;
   return fetch(request);
 }
@@ -215,7 +215,7 @@ void TileCheck::look_at_missing(const TileKey& key, const HttpAnswer& answer) {
 }
 
 void TileCheck::add_flipped(const std::string& url, const std::string& text) {
-  const bool says_south = layer_.row_order == RowOrder::kFromSouth;
+  const bool says_south = layer_.row_order == RowOrder::kTms;
   add(CheckKind::kRowsFlipped, url,
       fmt::format("rows are counted from the {}, but layer.json says that they are counted from "
                   "the {}: {}",
@@ -229,7 +229,7 @@ bool TileCheck::lies_at_mirrored_name(const TileKey& key) {
   if (answer && answer->status == 200) {
     CheckLog unused;
     const auto mesh = check_tile_body(layer_, key, *answer, unused);
-    if (mesh && place_of_tile(layer_.scheme, key, mesh->header) == TilePlace::kHere) return true;
+    if (mesh && place_of_tile(layer_.scheme, key, mesh->header) == Whereabouts::kHere) return true;
   }
   ++vain_mirrored_names_;
   return false;
@@ -242,11 +242,11 @@ void TileCheck::look_at_place(const TileKey& key, const QuantizedMesh& mesh,
   const std::string text = fmt::format("the bounding sphere of {} is around {}", to_string(key),
                                        place_text(mesh.header.sphere_centre_ecef_m));
   switch (place_of_tile(layer_.scheme, key, mesh.header)) {
-    case TilePlace::kHere:
+    case Whereabouts::kHere:
       return;
-    case TilePlace::kMirroredRow:
+    case Whereabouts::kMirroredRow:
       return add_flipped(url, text);
-    case TilePlace::kElsewhere:
+    case Whereabouts::kElsewhere:
       return add(CheckKind::kTileMisplaced, url, text);
   }
 }

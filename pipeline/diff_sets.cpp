@@ -41,7 +41,7 @@ std::vector<SharedKey> joined(const std::vector<TileKey>& a, const std::vector<T
 
 enum class Verdict { kOnlyInA, kOnlyInB, kSameBytes, kSameUnpacked, kDifferent };
 
-struct Comparison {
+struct TileComparison {
   Verdict verdict = Verdict::kSameBytes;
   TileDifference difference = {};  // of kDifferent
 };
@@ -70,8 +70,8 @@ ReadTile read_tile(Result<Bytes> stored) {
   return tile;
 }
 
-Comparison different(const TileKey& key, const ReadTile& a, const ReadTile& b) {
-  Comparison comparison = {.verdict = Verdict::kDifferent, .difference = {.key = key}};
+TileComparison different(const TileKey& key, const ReadTile& a, const ReadTile& b) {
+  TileComparison comparison = {.verdict = Verdict::kDifferent, .difference = {.key = key}};
   TileDifference& difference = comparison.difference;
   for (const auto& [name, fault] : {std::pair("A", &a.fault), std::pair("B", &b.fault)}) {
     if (fault->empty()) continue;
@@ -87,7 +87,7 @@ Comparison different(const TileKey& key, const ReadTile& a, const ReadTile& b) {
   return comparison;
 }
 
-Comparison compare_tiles(const TileKey& key, const TileSet& a, const TileSet& b) {
+TileComparison compare_tiles(const TileKey& key, const TileSet& a, const TileSet& b) {
   auto stored_a = a.read(key);
   auto stored_b = b.read(key);
   if (stored_a && stored_b && *stored_a == *stored_b) return {.verdict = Verdict::kSameBytes};
@@ -114,7 +114,7 @@ class Collector {
       : most_listed_(static_cast<std::size_t>(most_listed)) {}
 
   // REQUIRES: by key.
-  void add(const SharedKey& shared, Comparison comparison) {
+  void add(const SharedKey& shared, TileComparison comparison) {
     const TileKey& key = shared.key;
     if (report_.zooms.empty() || report_.zooms.back().zoom != key.zoom) {
       report_.zooms.push_back({.zoom = key.zoom});
@@ -135,7 +135,7 @@ class Collector {
   }
 
  private:
-  static void count(const Comparison& comparison, ZoomDiff& counts) {
+  static void count(const TileComparison& comparison, ZoomDiff& counts) {
     switch (comparison.verdict) {
       case Verdict::kOnlyInA:
         ++counts.only_in_a;
@@ -186,7 +186,7 @@ DiffReport diff_sets(const TileSet& a, const TileSet& b, const DiffOptions& opti
   const Phase phase(progress, "diff", "tiles", count);
   const auto work = [&](std::int64_t index) -> InTurn {
     const SharedKey& shared = keys[static_cast<std::size_t>(index)];
-    Comparison comparison;
+    TileComparison comparison;
     if (shared.is_in_a && shared.is_in_b) {
       comparison = compare_tiles(shared.key, a, b);
     } else {

@@ -21,7 +21,7 @@ struct HttpHeader {
   std::string value;
 };
 
-struct HttpRequest {
+struct HttpQuestion {
   HttpMethod method = HttpMethod::kGet;
   std::string url;
   std::vector<HttpHeader> headers;
@@ -46,7 +46,7 @@ struct HttpAnswer {
 };
 
 // The error says in words why there is no answer: "cannot connect: connection refused".
-using Fetch = std::function<Result<HttpAnswer>(const HttpRequest&)>;
+using Fetch = std::function<Result<HttpAnswer>(const HttpQuestion&)>;
 
 // "Gzip" as "gzip": ASCII only, as HTTP compares names.
 std::string lower_case(std::string_view text);

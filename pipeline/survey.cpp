@@ -18,6 +18,7 @@
 
 #include "formats/errors.h"
 #include "formats/hdf5_lattice_store.h"
+#include "formats/lattice_window.h"
 #include "formats/source_block_cache.h"
 #include "formats/tiered_lattice_store.h"
 #include "pipeline/block_cover.h"
@@ -29,7 +30,6 @@ namespace qmpipe {
 namespace {
 
 constexpr std::size_t kManyTiles = 2000;
-constexpr std::size_t kBlockSize = static_cast<std::size_t>(kBlockPosts) * kBlockPosts;
 
 std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options,
                                       const std::shared_ptr<const std::vector<RasterInfo>>& sources,

@@ -12,21 +12,21 @@
 namespace qmpipe {
 namespace {
 
-struct Polyline {
+struct DecodedBorder {
   std::vector<std::uint16_t> along;
   std::vector<Vec3> points_ecef;
 };
 
 // Through decoded_position_ecef(), so that there is one truth about where a vertex is.
-Polyline decode_border(const TilingScheme& scheme, const TileKey& key, const TileBorders& tile,
-                       Side side) {
+DecodedBorder decode_border(const TilingScheme& scheme, const TileKey& key, const TileBorders& tile,
+                            Side side) {
   const bool is_vertical = side == Side::kWest || side == Side::kEast;
   const auto across =
       static_cast<std::uint16_t>(side == Side::kEast || side == Side::kNorth ? kQuantizedMax : 0);
   QuantizedMesh mesh;
   mesh.header.min_height_m = tile.min_height_m;
   mesh.header.max_height_m = tile.max_height_m;
-  Polyline line;
+  DecodedBorder line;
   for (const BorderVertex& vertex : tile.sides[index_of(side)]) {
     mesh.u.push_back(is_vertical ? across : vertex.along);
     mesh.v.push_back(is_vertical ? vertex.along : across);
@@ -43,7 +43,7 @@ Polyline decode_border(const TilingScheme& scheme, const TileKey& key, const Til
 
 // Where the line is at a position along the side; beyond its ends, its end.
 // REQUIRES: the line is not empty.
-Vec3 point_at(const Polyline& line, std::uint16_t along) {
+Vec3 point_at(const DecodedBorder& line, std::uint16_t along) {
   const auto after = std::lower_bound(line.along.begin(), line.along.end(), along);
   if (after == line.along.end()) return line.points_ecef.back();
   const auto k = static_cast<std::size_t>(after - line.along.begin());
@@ -58,10 +58,10 @@ struct Crack {
   std::uint16_t along = 0;
 };
 
-Crack largest_crack(const Polyline& a, const Polyline& b) {
+Crack largest_crack(const DecodedBorder& a, const DecodedBorder& b) {
   Crack crack;
   if (a.along.empty() || b.along.empty()) return crack;
-  const auto look = [&crack](const Polyline& from, const Polyline& to) {
+  const auto look = [&crack](const DecodedBorder& from, const DecodedBorder& to) {
     for (std::size_t k = 0; k < from.along.size(); ++k) {
       const double width_m = length(minus(from.points_ecef[k], point_at(to, from.along[k])));
       if (width_m > crack.width_m) crack = {.width_m = width_m, .along = from.along[k]};
@@ -73,7 +73,7 @@ Crack largest_crack(const Polyline& a, const Polyline& b) {
 }
 
 // The first position at which only one of the lines has a vertex.
-std::optional<std::uint16_t> first_difference(const Polyline& a, const Polyline& b) {
+std::optional<std::uint16_t> first_difference(const DecodedBorder& a, const DecodedBorder& b) {
   const auto [at_a, at_b] =
       std::mismatch(a.along.begin(), a.along.end(), b.along.begin(), b.along.end());
   if (at_a == a.along.end() && at_b == b.along.end()) return std::nullopt;
@@ -131,8 +131,8 @@ TileBorders borders_of(const QuantizedMesh& mesh) {
 BorderComparison compare_borders(const TilingScheme& scheme, const TileKey& key,
                                  const TileBorders& tile, Side side, const TileKey& neighbour_key,
                                  const TileBorders& neighbour) {
-  const Polyline here = decode_border(scheme, key, tile, side);
-  const Polyline there = decode_border(scheme, neighbour_key, neighbour, opposite(side));
+  const DecodedBorder here = decode_border(scheme, key, tile, side);
+  const DecodedBorder there = decode_border(scheme, neighbour_key, neighbour, opposite(side));
   const Crack crack = largest_crack(here, there);
   BorderComparison comparison;
   comparison.crack_m = crack.width_m;

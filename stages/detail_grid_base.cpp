@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "scheduler/check.h"
+#include "scheduler/lattice.h"
 #include "stages/detail_base.h"
 
 namespace qmpipe {
@@ -10,10 +11,6 @@ namespace {
 
 constexpr std::uint32_t kUnset = 0xFFFFFFFF;
 
-struct Post {
-  std::int32_t i = 0;
-  std::int32_t j = 0;
-};
 using PostTriangle = std::array<Post, 3>;
 
 class GridBase {

@@ -201,13 +201,14 @@ TEST(Place, OfEveryTileIsItsOwnAndNotItsMirrorsOrOneFarAway) {
           const TileKey key = {.zoom = zoom, .x = x, .y = y};
           SCOPED_TRACE(to_string(key));
           const QuantizedMeshHeader header = header_at(scheme.rectangle_deg(key));
-          ASSERT_EQ(place_of_tile(scheme, key, header), TilePlace::kHere);
-          ASSERT_EQ(place_of_tile(scheme, mirrored(scheme, key), header), TilePlace::kMirroredRow);
+          ASSERT_EQ(place_of_tile(scheme, key, header), Whereabouts::kHere);
+          ASSERT_EQ(place_of_tile(scheme, mirrored(scheme, key), header),
+                    Whereabouts::kMirroredRow);
           const TileKey far = {
               .zoom = zoom, .x = (x + scheme.columns(zoom) / 2) % scheme.columns(zoom), .y = y};
           const bool is_near_pole = y < 2 || y + 2 >= scheme.rows(zoom);
           if (!is_near_pole) {
-            ASSERT_EQ(place_of_tile(scheme, far, header), TilePlace::kElsewhere);
+            ASSERT_EQ(place_of_tile(scheme, far, header), Whereabouts::kElsewhere);
           }
         }
       }
@@ -219,9 +220,9 @@ TEST(Place, OfAHeaderWithoutNumbersIsElsewhere) {
   const TilingScheme scheme(Projection::kGeodetic);
   QuantizedMeshHeader header;
   header.sphere_centre_ecef_m = {std::nan(""), 0, 0};
-  EXPECT_EQ(place_of_tile(scheme, {.zoom = 3, .x = 2, .y = 5}, header), TilePlace::kElsewhere);
+  EXPECT_EQ(place_of_tile(scheme, {.zoom = 3, .x = 2, .y = 5}, header), Whereabouts::kElsewhere);
   header.max_height_m = std::numeric_limits<float>::infinity();
-  EXPECT_EQ(place_of_tile(scheme, {.zoom = 3, .x = 2, .y = 5}, header), TilePlace::kElsewhere);
+  EXPECT_EQ(place_of_tile(scheme, {.zoom = 3, .x = 2, .y = 5}, header), Whereabouts::kElsewhere);
 }
 
 }  // namespace

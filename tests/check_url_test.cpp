@@ -35,10 +35,10 @@ class Served {
  public:
   explicit Served(const SetFixture& set) : set_(set) {}
 
-  std::function<void(const HttpRequest&, HttpAnswer&)> change = [](const auto&, auto&) {};
+  std::function<void(const HttpQuestion&, HttpAnswer&)> change = [](const auto&, auto&) {};
   std::vector<std::string> asked;
 
-  Result<HttpAnswer> answer(const HttpRequest& request) {
+  Result<HttpAnswer> answer(const HttpQuestion& request) {
     asked.push_back(request.url);
     const WebAddress address = parse_web_address(request.url).value();
     HttpAnswer answer = {.status = 404, .url = request.url, .headers = {}, .body = {}};
@@ -58,7 +58,7 @@ class Served {
   }
 
   CheckReport check(const std::string& url = kUrl, const CheckOptions& options = {}) {
-    return check_url(url, options, [this](const HttpRequest& r) { return answer(r); });
+    return check_url(url, options, [this](const HttpQuestion& r) { return answer(r); });
   }
 
  private:
@@ -144,7 +144,7 @@ TEST(CheckUrl, GivesUpOnAServerThatLeavesTilesWithoutAnswer) {
   int asked = 0;
   Served served(sound_set());
   const CheckReport report =
-      check_url(kUrl, {}, [&](const HttpRequest& request) -> Result<HttpAnswer> {
+      check_url(kUrl, {}, [&](const HttpQuestion& request) -> Result<HttpAnswer> {
         if (request.url.ends_with("layer.json")) return served.answer(request);
         ++asked;
         return Error{"nobody there"};
@@ -197,7 +197,7 @@ TEST(CheckUrl, EveryTruncationOfLayerJsonIsAFault) {
   // Without the closing brace and what follows it.
   for (std::size_t size = 0; size + 2 < bytes->size(); ++size) {
     Served served(sound_set());
-    served.change = [size](const HttpRequest& request, HttpAnswer& answer) {
+    served.change = [size](const HttpQuestion& request, HttpAnswer& answer) {
       if (request.url.ends_with("layer.json")) answer.body.resize(size);
     };
     ASSERT_GT(served.check().count(CheckSeverity::kFault), 0) << size;
@@ -228,7 +228,7 @@ TEST(CheckUrl, EndsWithAReportWhateverTheAnswersHold) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
     Served served(sound_set());
-    served.change = [&random](const HttpRequest& request, HttpAnswer& answer) {
+    served.change = [&random](const HttpQuestion& request, HttpAnswer& answer) {
       // Plain bytes, so that damage gets past gzip's check sum.
       const auto plain = plain_tile_bytes(answer.body);
       if (plain && random() % 2 == 0) answer.body = *plain;

@@ -3,8 +3,9 @@
 
 Checked: includes point one way (scheduler <- formats <- stages <- pipeline <- tools; tests and perf
 may include anything); each third-party library is included only where the table below allows it,
-and in no header of ours; every header opens with a comment and has #pragma once; no file is longer
-than 600 lines; no top-level folder that nobody agreed on.
+and in no header of ours; every header opens with a comment and has #pragma once; a name that a
+header defines is defined nowhere else; no file is longer than 600 lines; no top-level folder that
+nobody agreed on.
 
   layering_test.py [ROOT]       checks a tree, prints every violation, exits 1 when there is one
   layering_test.py --self-test  builds trees with one violation each and checks that it is found
@@ -14,6 +15,8 @@ import pathlib
 import re
 import sys
 import tempfile
+
+from defined_names import defined_twice
 
 LAYERS = ["scheduler", "formats", "stages", "pipeline", "tools"]
 FREE_FOLDERS = ["tests", "perf"]  # these see everything, and nothing of a layer may include them
@@ -118,6 +121,7 @@ def check_tree(root):
     """Returns (violations, warnings) as lists of lines."""
     violations = []
     warnings = []
+    sources = {}
     for folder in sorted(p.name for p in root.iterdir() if p.is_dir()):
         if folder not in ALLOWED_FOLDERS | IGNORED_FOLDERS:
             violations.append(f"{folder}/: not one of the folders of DESIGN 2")
@@ -134,8 +138,11 @@ def check_tree(root):
             warnings.append(f"{path}: {len(lines)} lines, {WARN_LINES} is long")
         if path.suffix in (".h", ".cpp"):
             violations += check_includes(path, lines)
+            sources[path] = "\n".join(lines)
         if path.suffix == ".h":
             violations += check_header(path, lines)
+    # A test is a program of its own, so what it keeps to itself may be called as it likes.
+    violations += defined_twice(sources, is_alone=lambda path: layer_of(path) in FREE_FOLDERS)
     return violations, warnings
 
 
@@ -156,6 +163,22 @@ GOOD_TREE = {
     "docs/a.md": "text\n",
     "build/formats/a.h": "no header of ours\n",
     "tests/__pycache__/a.h": "no header of ours\n",
+    # Names that are no second definition: a declaration, a private class, an overload, another
+    # namespace, a member, a text, a comment, two unnamed namespaces, a test's own.
+    "stages/names.h": "// N.\n#pragma once\nnamespace qmpipe {\nclass Store;\n"
+                      "struct Post { int i; };\ninline constexpr int kWide = 1;\n"
+                      "inline int size_of(const Post& p) { return p.i; }\n"
+                      "template <class T>\nclass Cache { struct Impl; };\n}  // namespace qmpipe\n",
+    "stages/store.h": "// S.\n#pragma once\nnamespace qmpipe {\nclass Post;\n"
+                      "class Store { struct Post {}; };\ninline int size_of(int p) { return p; }\n"
+                      "namespace detail { struct Post {}; }\n}  // namespace qmpipe\n",
+    "stages/store.cpp": "namespace fs = std::filesystem;\nnamespace qmpipe {\nnamespace {\n"
+                        "struct Entry { int k; };  // struct Post {\n"
+                        'const char* const kText = "struct Post { int i; };";\n}\n'
+                        "struct Store::Impl { int Post = 1; };\nclass Own {};\n}\n",
+    "stages/names.cpp": "namespace fs = std::filesystem;\nnamespace qmpipe {\nnamespace {\n"
+                        "struct Entry { long k; };\n}\nint f() { struct Post {}; return 0; }\n}\n",
+    "tests/names_test.cpp": "namespace qmpipe {\nnamespace {\nstruct Post { int x; };\n}\n}\n",
 }
 
 HEADER = "// H.\n#pragma once\n"
@@ -191,6 +214,20 @@ FAULTS = [
     ("stages/b.cpp", "int x;\n" * 601, "601 lines"),
     ("tests/b.py", "x = 1\n" * 601, "601 lines"),
     ("src/b.cpp", "int x;\n", "src/: not one of the folders"),
+    ("tools/b.h", HEADER + "namespace qmpipe {\nstruct Post {\n  int x;\n};\n}\n",
+     "tools/b.h:4: qmpipe::Post is defined in stages/names.h:5 too"),
+    ("tools/b.h", HEADER + "namespace qmpipe {\nenum class Post : int { kA };\n}\n", "Post is"),
+    ("tools/b.h", HEADER + "namespace qmpipe {\nusing Post = int;\n}\n", "Post is defined"),
+    ("tools/b.h", HEADER + "namespace qmpipe {\ntemplate <class T, int N = (1 < 2)>\n"
+                           "class Cache final : public Base<T> {\n};\n}\n", "Cache is defined"),
+    ("tools/b.h", HEADER + "namespace qmpipe {\ninline constexpr long kWide{2};\n}\n", "kWide is"),
+    ("tools/b.h", HEADER + "namespace qmpipe {\ninline long size_of(const Post& q) {\n}\n}\n",
+     "size_of is defined"),
+    ("stages/b.cpp", "namespace qmpipe {\nnamespace {\nstruct Post {};\n}\n}\n",
+     "stages/b.cpp:3: qmpipe::Post is defined in stages/names.h:5 too"),
+    ("tests/b.cpp", "namespace qmpipe {\nstruct Post {};\n}\n", "Post is defined"),
+    # `Entry` is not the linker's in the others; `Own` is.
+    ("stages/z.cpp", "namespace qmpipe {\nstruct Entry {};\nclass Own {};\n}\n", "Own is defined"),
 ]
 
 

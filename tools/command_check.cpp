@@ -47,7 +47,7 @@ int run_check(const CheckArguments& arguments) {
   HttpClient client(arguments.timeout_s, stop_flag_of_signals());
   const CheckReport report =
       check_url(arguments.address, arguments.options,
-                [&client](const HttpRequest& request) { return client.send(request); });
+                [&client](const HttpQuestion& request) { return client.send(request); });
   const std::string text = arguments.wants_json ? json_of(report) : text_of(report);
   std::fwrite(text.data(), 1, text.size(), stdout);
   if (!report.is_answered) return kExitUnanswered;

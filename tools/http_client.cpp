@@ -146,7 +146,7 @@ struct HttpClient::Impl {
     QMPIPE_CHECK(curl_easy_setopt(handle.get(), option, value) == CURLE_OK);
   }
 
-  void prepare(const HttpRequest& request, const HeaderList& headers, Incoming& incoming) {
+  void prepare(const HttpQuestion& request, const HeaderList& headers, Incoming& incoming) {
     curl_easy_reset(handle.get());  // keeps the connections
     const long timeout_ms = std::max(1L, std::lround(timeout_s * 1000));
     detail.fill('\0');
@@ -196,7 +196,7 @@ HttpClient::~HttpClient() = default;
 HttpClient::HttpClient(HttpClient&&) noexcept = default;
 HttpClient& HttpClient::operator=(HttpClient&&) noexcept = default;
 
-Result<HttpAnswer> HttpClient::send(const HttpRequest& request) {
+Result<HttpAnswer> HttpClient::send(const HttpQuestion& request) {
   Incoming incoming;
   incoming.limit_bytes = request.limit_bytes;
   incoming.stop = impl_->stop;

@@ -27,7 +27,7 @@ class HttpClient {
   HttpClient(HttpClient&&) noexcept;
   HttpClient& operator=(HttpClient&&) noexcept;
 
-  Result<HttpAnswer> send(const HttpRequest& request);
+  Result<HttpAnswer> send(const HttpQuestion& request);
 
  private:
   struct Impl;
