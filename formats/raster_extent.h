@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "formats/crs_transform.h"
-#include "formats/raster_source.h"
+#include "formats/raster_grid.h"
 
 namespace qmpipe {
 

@@ -9,13 +9,12 @@
 #include <limits>
 #include <utility>
 
-#include "formats/crs_transform.h"
 #include "formats/errors.h"
 #include "formats/gdal_session.h"
 #include "formats/height_unit.h"
 #include "formats/raster_crs.h"
 #include "formats/raster_dataset.h"
-#include "formats/raster_extent.h"
+#include "formats/raster_placement.h"
 #include "formats/raster_reader.h"
 #include "scheduler/check.h"
 
@@ -24,33 +23,6 @@ namespace {
 
 constexpr double kLargestHeight = 1e30;
 constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
-// Files store the pixel size with a dozen digits at best, which adds up over the columns.
-constexpr double kWrapTolerancePixels = 0.01;
-// The same place after a transformation: a micrometre.
-constexpr double kSamePlaceDeg = 1e-11;
-
-// x = a + b column + c row, y = d + e column + f row (GDAL's geotransform), and its inverse.
-struct Affine {
-  double a = 0;
-  double b = 1;
-  double c = 0;
-  double d = 0;
-  double e = 0;
-  double f = 1;
-
-  double determinant() const { return b * f - c * e; }
-  bool is_axis_aligned() const { return c == 0 && e == 0; }
-  MapPoint map_of(const PixelPoint& p) const {
-    return {.x = a + b * p.column + c * p.row, .y = d + e * p.column + f * p.row};
-  }
-  PixelPoint pixel_of(const MapPoint& m) const {
-    const double x = m.x - a;
-    const double y = m.y - d;
-    // Divided one by one, so that a column depends on x alone, to the last bit.
-    if (is_axis_aligned()) return {.column = x / b, .row = y / f};
-    return {.column = (f * x - c * y) / determinant(), .row = (b * y - e * x) / determinant()};
-  }
-};
 
 // How the band's raw values become metres.
 struct HeightRule {
@@ -69,7 +41,7 @@ struct HeightRule {
 };
 
 // None when the file has no geotransform and does not need one: in a plane without CRS.
-std::optional<Affine> affine_of(GDALDataset& dataset, const std::string& path, CrsNeed need) {
+std::optional<PixelPlane> plane_of(GDALDataset& dataset, const std::string& path, CrsNeed need) {
   std::array<double, 6> g{};
   const bool is_given = dataset.GetGeoTransform(g.data()) == CE_None;
   if (!is_given || g == std::array<double, 6>{0, 1, 0, 0, 0, 1}) {
@@ -82,15 +54,20 @@ std::optional<Affine> affine_of(GDALDataset& dataset, const std::string& path, C
                              : "write the bounds into it: gdal_translate -a_ullr WEST NORTH EAST "
                                "SOUTH FILE NEW.tif");
   }
-  const Affine affine{g[0], g[1], g[2], g[3], g[4], g[5]};
-  const double area = affine.determinant();
+  const PixelPlane plane{.x0 = g[0],
+                         .x_per_column = g[1],
+                         .x_per_row = g[2],
+                         .y0 = g[3],
+                         .y_per_column = g[4],
+                         .y_per_row = g[5]};
+  const double area = plane.determinant();
   if (!std::isfinite(area) || area == 0 || !std::isfinite(g[0]) || !std::isfinite(g[3])) {
     throw IoError("cannot place the raster", path,
                   fmt::format("its geotransform ({}) cannot be inverted", fmt::join(g, ", ")),
                   "write the bounds into it: gdal_translate -a_ullr WEST NORTH EAST SOUTH FILE "
                   "NEW.tif");
   }
-  return affine;
+  return plane;
 }
 
 double void_value_of(GDALRasterBand& band) {
@@ -138,80 +115,23 @@ HeightRule height_rule_of(GDALRasterBand& band, const RasterCrs& crs, RasterInfo
   return rule;
 }
 
-std::vector<MapPoint> sample_points(const Affine& affine, const RasterInfo& info) {
-  constexpr int kSteps = 8;
-  std::vector<MapPoint> points;
-  for (int r = 0; r <= kSteps; ++r) {
-    for (int c = 0; c <= kSteps; ++c) {
-      points.push_back(affine.map_of({static_cast<double>(info.width) * c / kSteps,
-                                      static_cast<double>(info.height) * r / kSteps}));
-    }
-  }
-  return points;
-}
-
-// Then no transformation need be called at all.
-bool leaves_degrees_alone(const CrsTransform& transform, std::span<const MapPoint> points) {
-  return std::all_of(points.begin(), points.end(), [&transform](const MapPoint& point) {
-    if (std::abs(point.y) > 90) return true;
-    const LonLat at{.longitude_deg = std::remainder(point.x, 360.0), .latitude_deg = point.y};
-    const std::optional<MapPoint> same = transform.forward(at);
-    return same && std::abs(same->y - at.latitude_deg) <= kSamePlaceDeg &&
-           std::abs(std::remainder(same->x - at.longitude_deg, 360.0)) <= kSamePlaceDeg;
-  });
-}
-
 }  // namespace
-
-struct RasterPlacement {
-  RasterCrs crs;
-  bool is_identity = false;
-  std::string transformation = {};
-  bool is_ballpark = false;
-};
 
 struct RasterSource::Impl {
   OpenedRaster opened;
   GDALRasterBand* band = nullptr;
   RasterInfo info;
-  Affine affine;
   HeightRule rule;
-  std::unique_ptr<CrsTransform> transform;
-  bool is_identity = false;
-  // Of a geographic CRS, in its own unit (degrees, rarely grads): once round, and the raster's
-  // middle.
-  double turn = 360;
-  double middle_x = 0;
+  // Where it is placed on the globe.
+  std::optional<RasterGrid> grid;
   std::optional<RasterReader> reader;
   // Kept between reads.
   std::vector<std::uint8_t> mask;
 
   void describe(const std::string& path);
   void place_in_plane(const RasterCrs& crs);
-  void make_transform(const RasterCrs& crs, std::span<const MapPoint> points);
-  RasterPlacement placed_on_globe(RasterCrs crs);
-  void place_on_globe(const RasterPlacement& placement);
-  void measure();
-  std::optional<PixelPoint> pixel_at(const LonLat& point) const;
-  std::optional<LonLat> globe_at(const PixelPoint& point) const;
+  void place_on_globe(const RasterCrs& crs);
 };
-
-std::optional<PixelPoint> RasterSource::Impl::pixel_at(const LonLat& point) const {
-  MapPoint map{.x = point.longitude_deg, .y = point.latitude_deg};
-  if (!is_identity) {
-    const std::optional<MapPoint> projected = transform->forward(point);
-    if (!projected) return std::nullopt;
-    map = *projected;
-  }
-  if (info.is_geographic) map.x -= turn * std::floor((map.x - middle_x + turn / 2) / turn);
-  return affine.pixel_of(map);
-}
-
-std::optional<LonLat> RasterSource::Impl::globe_at(const PixelPoint& point) const {
-  const MapPoint map = affine.map_of(point);
-  if (is_identity) return LonLat{.longitude_deg = map.x, .latitude_deg = map.y};
-  return transform->inverse(map);
-}
 
 void RasterSource::Impl::describe(const std::string& path) {
   GDALDataset& dataset = *opened.dataset;
@@ -241,79 +161,28 @@ void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
   info.has_vertical_datum = crs.has_vertical_datum;
   info.assumptions.insert(info.assumptions.end(), crs.assumptions.begin(), crs.assumptions.end());
   const CrsNeed need = crs.text.wkt.empty() ? CrsNeed::kOptional : CrsNeed::kRequired;
-  const std::optional<Affine> given = affine_of(*opened.dataset, info.path, need);
+  const std::optional<PixelPlane> given = plane_of(*opened.dataset, info.path, need);
   // As a picture lies: the first row is the northernmost.
-  affine = given.value_or(Affine{0, 1, 0, static_cast<double>(info.height), 0, -1});
+  info.plane = given.value_or(PixelPlane{.y0 = static_cast<double>(info.height)});
+  info.plane.unit = crs.is_geographic ? 360 / crs.turn : crs.metres_per_unit;
   if (!given) {
     info.assumptions.emplace_back("the file has no geotransform; a pixel is taken as a metre");
   }
-  info.plane = {.x0 = affine.a,
-                .x_per_column = affine.b,
-                .x_per_row = affine.c,
-                .y0 = affine.d,
-                .y_per_column = affine.e,
-                .y_per_row = affine.f,
-                .unit = crs.is_geographic ? 360 / crs.turn : crs.metres_per_unit};
   rule = height_rule_of(*band, crs, info);
 }
 
-void RasterSource::Impl::make_transform(const RasterCrs& crs, std::span<const MapPoint> points) {
-  transform = CrsTransform::make(crs.text, points);
-  if (transform) return;
-  throw IoError("cannot place the raster", info.path,
-                "its CRS '" + crs.name + "' does not lead from the raster to the globe",
-                "name the right one with --source-crs EPSG:n");
-}
-
-RasterPlacement RasterSource::Impl::placed_on_globe(RasterCrs crs) {
-  const std::vector<MapPoint> points = sample_points(affine, info);
-  make_transform(crs, points);
-  RasterPlacement placement{.crs = std::move(crs),
-                            .transformation = transform->name(),
-                            .is_ballpark = transform->is_ballpark()};
-  placement.is_identity = placement.crs.is_geographic && leaves_degrees_alone(*transform, points);
-  return placement;
-}
-
-void RasterSource::Impl::place_on_globe(const RasterPlacement& placement) {
-  is_identity = placement.is_identity;
-  if (is_identity) {
-    // It holds a connection to PROJ's database, one for each raster.
-    transform.reset();
-  } else if (!transform) {
-    make_transform(placement.crs, sample_points(affine, info));
+void RasterSource::Impl::place_on_globe(const RasterCrs& crs) {
+  grid = RasterGrid::place(info, crs);
+  if (!grid) {
+    throw IoError("cannot place the raster", info.path,
+                  "its CRS '" + crs.name + "' does not lead from the raster to the globe",
+                  "name the right one with --source-crs EPSG:n");
   }
-  info.transformation = placement.transformation;
-  if (placement.is_ballpark) {
-    info.assumptions.push_back("no transformation is known from the datum of the CRS '" +
-                               placement.crs.name + "' to WGS84; they are taken as the same");
-  }
-  turn = placement.crs.turn;
-  info.is_separable = is_identity && affine.is_axis_aligned();
-  middle_x =
-      affine.map_of({static_cast<double>(info.width) / 2, static_cast<double>(info.height) / 2}).x;
-}
-
-void RasterSource::Impl::measure() {
-  const RasterSize size{.width = info.width, .height = info.height};
-  const ToGlobe to_globe = [this](const PixelPoint& p) { return globe_at(p); };
-  if (info.is_separable) {
-    const MapPoint first = affine.map_of({0, 0});
-    const MapPoint last =
-        affine.map_of({static_cast<double>(info.width), static_cast<double>(info.height)});
-    info.bounds_deg = tidy_bounds({.west_deg = std::min(first.x, last.x),
-                                   .south_deg = std::min(first.y, last.y),
-                                   .east_deg = std::max(first.x, last.x),
-                                   .north_deg = std::max(first.y, last.y)});
-    info.pixel_deg = std::min(std::abs(affine.b), std::abs(affine.f));
-    const double turn_pixels = 360 / std::abs(affine.b);
-    info.wraps_columns =
-        std::abs(turn_pixels - static_cast<double>(info.width)) <= kWrapTolerancePixels;
-  } else {
-    const std::optional<RectangleDeg> bounds =
-        bounds_on_globe(size, to_globe, [this](const LonLat& p) { return pixel_at(p); });
-    if (bounds) info.bounds_deg = *bounds;
-    info.pixel_deg = smallest_pixel_deg(size, to_globe);
+  static_cast<GridInfo&>(info) = grid->info();
+  info.transformation = info.placement->transformation;
+  if (info.placement->is_ballpark) {
+    info.assumptions.push_back("no transformation is known from the datum of the CRS '" + crs.name +
+                               "' to WGS84; they are taken as the same");
   }
   const RectangleDeg& b = info.bounds_deg;
   if (!(info.pixel_deg > 0) || !(b.west_deg < b.east_deg) || !(b.south_deg < b.north_deg)) {
@@ -333,29 +202,25 @@ std::unique_ptr<RasterSource> RasterSource::open(const std::string& path,
   auto impl = std::make_unique<Impl>();
   impl->opened = open_dataset(path);
   impl->describe(path);
-  const bool on_globe = options.placing == Placing::kGlobe;
   if (options.placement) {
     impl->info.placement = options.placement;
     impl->place_in_plane(options.placement->crs);
   } else {
-    RasterCrs crs = crs_of(*impl->opened.dataset, path, impl->opened.name, options.crs_override,
-                           on_globe ? CrsNeed::kRequired : CrsNeed::kOptional);
+    const bool on_globe = options.placing == Placing::kGlobe;
+    const RasterCrs crs =
+        crs_of(*impl->opened.dataset, path, impl->opened.name, options.crs_override,
+               on_globe ? CrsNeed::kRequired : CrsNeed::kOptional);
     impl->place_in_plane(crs);
-    impl->info.placement = std::make_shared<const RasterPlacement>(
-        on_globe ? impl->placed_on_globe(std::move(crs)) : RasterPlacement{.crs = std::move(crs)});
-  }
-  if (on_globe) {
-    impl->place_on_globe(*impl->info.placement);
-    impl->measure();
+    if (on_globe) impl->place_on_globe(crs);
   }
   describe_blocks(*impl->band, impl->rule.has_mask, impl->info);
   impl->reader.emplace(*impl->band, impl->rule.has_mask, impl->info, options.cache, options.number);
   return std::unique_ptr<RasterSource>(new RasterSource(std::move(impl)));
 }
 
-std::optional<PixelPoint> RasterSource::pixel_at(double longitude_deg, double latitude_deg) const {
-  QMPIPE_CHECK(impl_->info.pixel_deg > 0);
-  return impl_->pixel_at({.longitude_deg = longitude_deg, .latitude_deg = latitude_deg});
+const RasterGrid& RasterSource::grid() const {
+  QMPIPE_CHECK(impl_->grid.has_value());
+  return *impl_->grid;
 }
 
 void RasterSource::read(const PixelWindow& window, std::span<double> out) const {

@@ -22,8 +22,7 @@ constexpr std::int64_t kManySources = 64;
 // The CRS is taken over from the first opening, and what that was is not looked at again.
 bool is_the_same(const RasterInfo& a, const RasterInfo& b) {
   return a.width == b.width && a.height == b.height && a.block_width == b.block_width &&
-         a.block_height == b.block_height && a.type_name == b.type_name &&
-         a.bounds_deg == b.bounds_deg;
+         a.block_height == b.block_height && a.type_name == b.type_name && a.plane == b.plane;
 }
 
 }  // namespace
@@ -48,7 +47,7 @@ std::unique_ptr<RasterSource> SourcePool::open(std::size_t number) const {
   return source;
 }
 
-const RasterSource& SourcePool::source(std::size_t number) {
+SourcePool::Opened& SourcePool::opened(std::size_t number) {
   QMPIPE_CHECK(number < size());
   ++asked_;
   auto found = std::find_if(opened_.begin(), opened_.end(),
@@ -62,6 +61,7 @@ const RasterSource& SourcePool::source(std::size_t number) {
           [](const Opened& a, const Opened& b) { return a.last_asked < b.last_asked; });
       // Before the other is opened, which could be one file too many.
       found->source.reset();
+      found->grid.reset();
     }
     // Of no raster, until the one is open.
     found->number = size();
@@ -69,7 +69,15 @@ const RasterSource& SourcePool::source(std::size_t number) {
     found->number = number;
   }
   found->last_asked = asked_;
-  return *found->source;
+  return *found;
+}
+
+const RasterSource& SourcePool::source(std::size_t number) { return *opened(number).source; }
+
+const RasterGrid& SourcePool::grid(std::size_t number) {
+  Opened& one = opened(number);
+  if (!one.grid) one.grid.emplace(info(number));
+  return *one.grid;
 }
 
 std::size_t sources_open_at_once(std::int32_t threads) {

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "formats/raster_source.h"
@@ -26,13 +27,17 @@ class SourcePool {
   // Stays open until so many others as may be open were asked for. Throws IoError as
   // RasterSource::open() does, and when the raster is not the one that the info tells of.
   const RasterSource& source(std::size_t number);
+  // Where its pixels lie on the globe; the same holds.
+  const RasterGrid& grid(std::size_t number);
 
  private:
   struct Opened {
     std::size_t number = 0;
     std::int64_t last_asked = 0;
     std::unique_ptr<RasterSource> source;
+    std::optional<RasterGrid> grid;
   };
+  Opened& opened(std::size_t number);
   std::unique_ptr<RasterSource> open(std::size_t number) const;
 
   std::shared_ptr<const std::vector<RasterInfo>> infos_;

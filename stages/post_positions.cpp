@@ -48,15 +48,15 @@ struct Cell {
 
 class CellFiller {
  public:
-  CellFiller(const RasterSource& source, const Lattice& lattice, const PostWindow& block,
+  CellFiller(const RasterGrid& grid, const Lattice& lattice, const PostWindow& block,
              std::span<PixelPoint> out)
-      : source_(source), lattice_(lattice), block_(block), out_(out) {}
+      : grid_(grid), lattice_(lattice), block_(block), out_(out) {}
 
   void fill_block();
 
  private:
   PixelPoint exact(std::int32_t i, std::int32_t j) const {
-    return source_.pixel_at(lattice_.longitude_deg(i), lattice_.latitude_deg(j)).value_or(kNowhere);
+    return grid_.pixel_at(lattice_.longitude_deg(i), lattice_.latitude_deg(j)).value_or(kNowhere);
   }
   PixelPoint& at(std::int32_t i, std::int32_t j) const {
     const auto row = static_cast<std::size_t>(j - block_.j0);
@@ -71,7 +71,7 @@ class CellFiller {
   void split(const Cell& cell) const;
   bool is_off_raster(const Cell& cell) const;
 
-  const RasterSource& source_;
+  const RasterGrid& grid_;
   const Lattice& lattice_;
   const PostWindow& block_;
   std::span<PixelPoint> out_;
@@ -91,7 +91,7 @@ void CellFiller::fill(const Cell& cell) const {
   if (posts.i0 >= posts.i1 || posts.j0 >= posts.j1) return;
   const PostRange closed{
       .i0 = cell.i, .j0 = cell.j, .i1 = cell.i + cell.size_posts, .j1 = cell.j + cell.size_posts};
-  if (!touches_bounds(source_.info(), lattice_, closed)) return;
+  if (!touches_bounds(grid_.info(), lattice_, closed)) return;
   if (cell.is_straight()) {
     if (!is_off_raster(cell)) interpolate(cell, posts);
   } else {
@@ -103,8 +103,8 @@ bool CellFiller::is_off_raster(const Cell& cell) const {
   const auto [left, right] =
       std::minmax({cell.sw.column, cell.se.column, cell.nw.column, cell.ne.column});
   const auto [top, bottom] = std::minmax({cell.sw.row, cell.se.row, cell.nw.row, cell.ne.row});
-  return right < -1 || bottom < -1 || left > static_cast<double>(source_.info().width) + 1 ||
-         top > static_cast<double>(source_.info().height) + 1;
+  return right < -1 || bottom < -1 || left > static_cast<double>(grid_.info().width) + 1 ||
+         top > static_cast<double>(grid_.info().height) + 1;
 }
 
 void CellFiller::interpolate(const Cell& cell, const PostRange& posts) const {
@@ -193,16 +193,15 @@ void CellFiller::fill_block() {
   }
 }
 
-void locate_separable(const RasterSource& source, const Lattice& lattice, const PostWindow& block,
+void locate_separable(const RasterGrid& grid, const Lattice& lattice, const PostWindow& block,
                       std::span<PixelPoint> out) {
   std::vector<double> columns(static_cast<std::size_t>(block.width_posts));
   for (std::size_t k = 0; k < columns.size(); ++k) {
     const double longitude_deg = lattice.longitude_deg(block.i0 + static_cast<std::int32_t>(k));
-    columns[k] = source.pixel_at(longitude_deg, 0).value_or(kNowhere).column;
+    columns[k] = grid.pixel_at(longitude_deg, 0).value_or(kNowhere).column;
   }
   for (std::int32_t r = 0; r < block.height_posts; ++r) {
-    const double row =
-        source.pixel_at(0, lattice.latitude_deg(block.j0 + r)).value_or(kNowhere).row;
+    const double row = grid.pixel_at(0, lattice.latitude_deg(block.j0 + r)).value_or(kNowhere).row;
     PixelPoint* const line = out.data() + static_cast<std::size_t>(r) * columns.size();
     for (std::size_t k = 0; k < columns.size(); ++k) line[k] = {.column = columns[k], .row = row};
   }
@@ -210,20 +209,20 @@ void locate_separable(const RasterSource& source, const Lattice& lattice, const 
 
 }  // namespace
 
-void locate_posts(const RasterSource& source, const Lattice& lattice, const PostWindow& block,
+void locate_posts(const RasterGrid& grid, const Lattice& lattice, const PostWindow& block,
                   std::span<PixelPoint> out) {
   QMPIPE_CHECK(block.i0 >= 0 && block.i0 + block.width_posts <= lattice.columns());
   QMPIPE_CHECK(block.j0 >= 0 && block.j0 + block.height_posts <= lattice.rows());
   QMPIPE_CHECK(out.size() == block.size());
-  if (source.info().is_separable) {
-    locate_separable(source, lattice, block, out);
+  if (grid.info().is_separable) {
+    locate_separable(grid, lattice, block, out);
   } else {
     std::fill(out.begin(), out.end(), kNowhere);
-    CellFiller(source, lattice, block, out).fill_block();
+    CellFiller(grid, lattice, block, out).fill_block();
   }
 }
 
-bool touches_bounds(const RasterInfo& info, const Lattice& lattice, const PostRange& range) {
+bool touches_bounds(const GridInfo& info, const Lattice& lattice, const PostRange& range) {
   const RectangleDeg& b = info.bounds_deg;
   const double width_deg = b.east_deg - b.west_deg;
   const double height_deg = b.north_deg - b.south_deg;

@@ -1,4 +1,4 @@
-// Where posts lie on a raster.
+// Where posts lie on a raster's grid.
 //
 // Guarantees: a post's position is a pure function of the post and the raster, whatever block it is
 // asked in. Rasters in degrees of WGS84: exact. All others: the exact transformation at anchor
@@ -9,7 +9,7 @@
 
 #include <span>
 
-#include "formats/raster_source.h"
+#include "formats/raster_grid.h"
 #include "scheduler/lattice.h"
 
 namespace qmpipe {
@@ -20,7 +20,7 @@ inline constexpr double kPositionTolerancePixels = 0.01;
 // Positions of the block's posts, row by row from the south; NaN for posts that certainly do not
 // lie on the raster (others may lie outside it too). REQUIRES: 0 <= i0, i0 + width_posts <=
 // columns; rows inside the lattice; out.size() == block.size().
-void locate_posts(const RasterSource& source, const Lattice& lattice, const PostWindow& block,
+void locate_posts(const RasterGrid& grid, const Lattice& lattice, const PostWindow& block,
                   std::span<PixelPoint> out);
 
 // True when the closed rectangle of the posts i0..i1, j0..j1 touches the bounds, widened by two
@@ -31,6 +31,6 @@ struct PostRange {
   std::int32_t i1 = 0;
   std::int32_t j1 = 0;
 };
-bool touches_bounds(const RasterInfo& info, const Lattice& lattice, const PostRange& range);
+bool touches_bounds(const GridInfo& info, const Lattice& lattice, const PostRange& range);
 
 }  // namespace qmpipe

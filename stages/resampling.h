@@ -10,7 +10,7 @@
 #include <optional>
 #include <span>
 
-#include "formats/raster_source.h"
+#include "formats/raster_grid.h"
 
 namespace qmpipe {
 

@@ -66,7 +66,7 @@ struct Sampler::Impl {
   std::map<std::pair<std::int32_t, std::int32_t>, float> pole_heights_m;
 
   void sample_strip(const Lattice& lattice, const Strip& strip);
-  void sample_block(const RasterSource& source, const Lattice& lattice, const Strip& block);
+  void sample_block(std::size_t number, const Lattice& lattice, const Strip& block);
   void sample_part(const RasterSource& source, const Strip& block, const Part& part);
   void fetch(const RasterSource& source, const PixelWindow& needed);
   void read_piece(const RasterSource& source, const PixelWindow& piece, double* out,
@@ -159,12 +159,11 @@ void Sampler::Impl::sample_part(const RasterSource& source, const Strip& block, 
   }
 }
 
-void Sampler::Impl::sample_block(const RasterSource& source, const Lattice& lattice,
-                                 const Strip& block) {
+void Sampler::Impl::sample_block(std::size_t number, const Lattice& lattice, const Strip& block) {
   const auto width = static_cast<std::size_t>(block.posts.width_posts);
   const auto height = static_cast<std::size_t>(block.posts.height_posts);
   places.resize(block.posts.size());
-  locate_posts(source, lattice, block.posts, places);
+  locate_posts(sources.grid(number), lattice, block.posts, places);
   for (std::size_t r = 0; r < height; ++r) {
     const std::span<const float> row = block.row(r, 0, width);
     for (std::size_t k = 0; k < width; ++k) {
@@ -173,7 +172,7 @@ void Sampler::Impl::sample_block(const RasterSource& source, const Lattice& latt
         places[r * width + k].column = std::numeric_limits<double>::quiet_NaN();
     }
   }
-  sample_part(source, block, {.width = width, .height = height});
+  sample_part(sources.source(number), block, {.width = width, .height = height});
 }
 
 void Sampler::Impl::sample_strip(const Lattice& lattice, const Strip& strip) {
@@ -194,7 +193,7 @@ void Sampler::Impl::sample_strip(const Lattice& lattice, const Strip& strip) {
       for (std::size_t k = 0; k < sources.size(); ++k) {
         if (!touches_bounds(sources.info(k), lattice, range)) continue;
         if (is_full(block)) break;
-        sample_block(sources.source(k), lattice, block);
+        sample_block(k, lattice, block);
       }
     }
   }

@@ -85,7 +85,7 @@ TEST(Sampling, PlacesInUtmAreExactToAHundredthOfAPixel) {
     const PostWindow window = around(lattice, (bounds.west_deg + bounds.east_deg) / 2,
                                      (bounds.south_deg + bounds.north_deg) / 2, 150, 130);
     std::vector<PixelPoint> places(window.size());
-    locate_posts(*source, lattice, window, places);
+    locate_posts(source->grid(), lattice, window, places);
     for (std::size_t k = 0; k < places.size(); k += 7) {
       const auto i = window.i0 + static_cast<int>(k) % window.width_posts;
       const auto j = window.j0 + static_cast<int>(k) / window.width_posts;

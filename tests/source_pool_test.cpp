@@ -62,7 +62,7 @@ TEST_F(SourcePoolTest, ReadsTheSameHoweverFewAreOpen) {
       EXPECT_EQ(source.info().path, paths_[number]);
       EXPECT_EQ(read_all(source).front(), 100.0 * static_cast<double>(number));
       const double longitude_deg = 11.5 + 4 * static_cast<double>(number);
-      const auto place = source.pixel_at(longitude_deg, 48.5);
+      const auto place = few.grid(number).pixel_at(longitude_deg, 48.5);
       ASSERT_TRUE(place);
       EXPECT_NEAR(place->column, 1.5, 0.01);
       EXPECT_LE(open_files(), static_cast<std::ptrdiff_t>(most_open));
