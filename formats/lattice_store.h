@@ -18,6 +18,15 @@ namespace qmpipe {
 
 inline constexpr std::int32_t kBlockPosts = 256;
 
+// The column or row of blocks that a column or row of posts lies in. REQUIRES: post >= 0.
+constexpr std::int32_t block_of_post(std::int64_t post) {
+  return static_cast<std::int32_t>(post / kBlockPosts);
+}
+// The first post of a column or row of blocks.
+constexpr std::int64_t first_post_of_block(std::int32_t block) {
+  return std::int64_t{block} * kBlockPosts;
+}
+
 class LatticeStore {
  public:
   virtual ~LatticeStore() = default;

@@ -27,13 +27,14 @@ struct SampledRaster {
 std::vector<PostWindow> blocks_of(const RasterInfo& info, const Lattice& lattice) {
   const RectangleDeg& box = info.bounds_deg;
   const auto first = [](double post) {
-    return static_cast<std::int32_t>(std::ceil(post / kBlockPosts)) * kBlockPosts;
+    return static_cast<std::int64_t>(std::ceil(post / kBlockPosts)) * kBlockPosts;
   };
   std::vector<PostWindow> blocks;
-  for (std::int32_t j = first(lattice.row_at(box.south_deg));
-       j + kBlockPosts <= lattice.row_at(box.north_deg); j += kBlockPosts) {
-    for (std::int32_t i = first(lattice.column_at(box.west_deg));
-         i + kBlockPosts <= lattice.column_at(box.east_deg); i += kBlockPosts) {
+  for (std::int64_t j = first(lattice.row_at(box.south_deg));
+       static_cast<double>(j + kBlockPosts) <= lattice.row_at(box.north_deg); j += kBlockPosts) {
+    for (std::int64_t i = first(lattice.column_at(box.west_deg));
+         static_cast<double>(i + kBlockPosts) <= lattice.column_at(box.east_deg);
+         i += kBlockPosts) {
       blocks.push_back({.i0 = i, .j0 = j, .width_posts = kBlockPosts, .height_posts = kBlockPosts});
     }
   }

@@ -58,10 +58,10 @@ BlockSpan covered_span(const Lattice& lattice, const RasterInfo& source) {
   BlockSpan span;
   span.first_x = block(lattice.column_at(box.west_deg) - 1);
   span.width = std::min(block(lattice.column_at(box.east_deg) + 1) - span.first_x + 1,
-                        lattice.columns() / kBlockPosts);
+                        lattice.scheme().columns(lattice.zoom()));
   span.first_y = std::max(0, block(lattice.row_at(box.south_deg) - 1));
   const std::int32_t last_y =
-      std::min((lattice.rows() - 1) / kBlockPosts, block(lattice.row_at(box.north_deg) + 1));
+      std::min(block_of_post(lattice.rows() - 1), block(lattice.row_at(box.north_deg) + 1));
   span.height = std::max(0, last_y - span.first_y + 1);
   return span;
 }

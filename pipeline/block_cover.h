@@ -15,8 +15,8 @@ namespace qmpipe {
 using BlockKey = TileKey;
 
 inline PostWindow posts_of(const BlockKey& block) {
-  return {.i0 = block.x * kBlockPosts,
-          .j0 = block.y * kBlockPosts,
+  return {.i0 = first_post_of_block(block.x),
+          .j0 = first_post_of_block(block.y),
           .width_posts = kBlockPosts,
           .height_posts = kBlockPosts};
 }

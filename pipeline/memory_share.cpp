@@ -39,9 +39,9 @@ MemoryNeeds needs_of(const SurveyOptions& survey, const std::vector<RasterInfo>&
   needs.source_handle_bytes += static_cast<std::int64_t>(handles.size() - 1) * kOpenSourceBytes;
   const Lattice lattice(survey.scheme, chosen_sampling_zoom(survey, sources));
   // The rest is better used for tiles in flight, and for the system's own cache of the files.
-  needs.source_front_bytes =
-      std::min(front_bytes(lattice, sources, survey.threads, lattice.columns() / kBlockPosts),
-               limit_bytes / 4);
+  needs.source_front_bytes = std::min(
+      front_bytes(lattice, sources, survey.threads, lattice.scheme().columns(lattice.zoom())),
+      limit_bytes / 4);
   return needs;
 }
 

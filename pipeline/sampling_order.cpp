@@ -50,6 +50,10 @@ Footprint footprint_of(const Lattice& lattice, const RasterInfo& source) {
           .cached_block_bytes = source.cached_block_bytes};
 }
 
+std::int32_t columns_of_blocks(const Lattice& lattice) {
+  return lattice.scheme().columns(lattice.zoom());
+}
+
 // Source blocks that so many pixels in a row may touch, wherever they begin.
 std::int64_t touched(double pixels, double block_pixels, std::int64_t most) {
   const double blocks = std::floor((pixels + kMarginPixels) / block_pixels) + 2;
@@ -89,8 +93,7 @@ std::int64_t most_at_once(const Changes& changes) {
 std::int64_t front_bytes(const Lattice& lattice, const std::vector<RasterInfo>& sources,
                          std::int32_t threads, std::int32_t strip_blocks) {
   QMPIPE_CHECK(strip_blocks >= 1);
-  const std::int32_t strips =
-      std::max(1, (lattice.columns() / kBlockPosts + strip_blocks - 1) / strip_blocks);
+  const std::int32_t strips = (columns_of_blocks(lattice) + strip_blocks - 1) / strip_blocks;
   std::map<std::int32_t, Changes> changes_of_strip;
   for (const RasterInfo& info : sources) {
     const Footprint source = footprint_of(lattice, info);
@@ -116,7 +119,7 @@ std::int64_t front_bytes(const Lattice& lattice, const std::vector<RasterInfo>& 
 
 std::int32_t widest_strip(const Lattice& lattice, const std::vector<RasterInfo>& sources,
                           std::int32_t threads, std::int64_t cache_bytes) {
-  std::int32_t best = std::max(1, lattice.columns() / kBlockPosts);
+  std::int32_t best = columns_of_blocks(lattice);
   std::int64_t smallest = front_bytes(lattice, sources, threads, best);
   for (std::int32_t strip = best / 2; strip >= 1 && smallest > cache_bytes; strip /= 2) {
     const std::int64_t bytes = front_bytes(lattice, sources, threads, strip);

@@ -93,7 +93,7 @@ class Surveyor {
   void reduce_to(std::vector<BlockKey>& blocks);
   void settle_poles(const std::vector<BlockKey>& blocks, std::int32_t zoom);
   std::optional<float> settle_pole(const std::vector<BlockKey>& blocks, const Lattice& lattice,
-                                   std::int32_t j) const;
+                                   std::int64_t j) const;
   void list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom);
   SurveyedTile examine(const TileKey& key) const;
 
@@ -151,14 +151,14 @@ void Surveyor::reduce_to(std::vector<BlockKey>& blocks) {
 
 // All posts of a pole row are one point of the globe: they get the mean of those that are valid.
 std::optional<float> Surveyor::settle_pole(const std::vector<BlockKey>& blocks,
-                                           const Lattice& lattice, std::int32_t j) const {
+                                           const Lattice& lattice, std::int64_t j) const {
   const std::int32_t zoom = lattice.zoom();
   std::vector<float> block_m(kBlockSize);
-  const auto row = block_m.begin() + static_cast<std::ptrdiff_t>(j % kBlockPosts) * kBlockPosts;
+  const auto row = block_m.begin() + j % kBlockPosts * kBlockPosts;
   double sum_m = 0;
   std::int64_t count = 0;
   for (const BlockKey& block : blocks) {
-    if (block.zoom != zoom || block.y != j / kBlockPosts) continue;
+    if (block.zoom != zoom || block.y != block_of_post(j)) continue;
     survey_.store->read(lattice, posts_of(block), block_m);
     std::for_each(row, row + kBlockPosts, [&](float h) {
       if (std::isnan(h)) return;
@@ -169,7 +169,7 @@ std::optional<float> Surveyor::settle_pole(const std::vector<BlockKey>& blocks,
   if (count == 0) return std::nullopt;
   const auto height_m = static_cast<float>(sum_m / static_cast<double>(count));
   for (const BlockKey& block : blocks) {
-    if (block.zoom != zoom || block.y != j / kBlockPosts) continue;
+    if (block.zoom != zoom || block.y != block_of_post(j)) continue;
     survey_.store->read(lattice, posts_of(block), block_m);
     std::replace_if(
         row, row + kBlockPosts, [](float h) { return !std::isnan(h); }, height_m);
@@ -243,7 +243,7 @@ bool Surveyor::is_done_already(const BlockKey& block) const {
   if (options_.record == nullptr || !is_on_disk(block.zoom)) return false;
   const Lattice lattice(survey_.scheme, block.zoom);
   const bool has_pole =
-      lattice.is_pole_row(0) && (block.y == 0 || block.y == (lattice.rows() - 1) / kBlockPosts);
+      lattice.is_pole_row(0) && (block.y == 0 || block.y == block_of_post(lattice.rows() - 1));
   return !has_pole && survey_.store->has_block(block.zoom, block.x, block.y);
 }
 

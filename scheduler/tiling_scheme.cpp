@@ -29,8 +29,8 @@ RectangleDeg TilingScheme::rectangle_deg(const TileKey& key) const {
   // The lattice is the one place that knows coordinates, so that a tile's corner and the post on
   // it are the same double.
   const Lattice lattice(*this, key.zoom);
-  const std::int32_t i0 = key.x * kTileIntervals;
-  const std::int32_t j0 = key.y * kTileIntervals;
+  const std::int64_t i0 = first_post(key.x);
+  const std::int64_t j0 = first_post(key.y);
   return {.west_deg = lattice.longitude_deg(i0),
           .south_deg = lattice.latitude_deg(j0),
           .east_deg = lattice.longitude_deg(i0 + kTileIntervals),

@@ -7,20 +7,22 @@ namespace qmpipe {
 namespace {
 
 // Rounds down for negative columns too, which a halo west of column 0 has.
-constexpr std::int32_t half_down(std::int32_t k) { return k >> 1; }
-constexpr std::int32_t half_up(std::int32_t k) { return (k + 1) >> 1; }
+constexpr std::int64_t half_down(std::int64_t k) { return k >> 1; }
+constexpr std::int64_t half_up(std::int64_t k) { return (k + 1) >> 1; }
 
 // The posts of the coarser zoom between which the window's posts lie.
 PostWindow coarser_window(const PostWindow& window) {
-  const std::int32_t i0 = half_down(window.i0);
-  const std::int32_t j0 = half_down(window.j0);
+  const std::int64_t i0 = half_down(window.i0);
+  const std::int64_t j0 = half_down(window.j0);
   return {.i0 = i0,
           .j0 = j0,
-          .width_posts = half_up(window.i0 + window.width_posts - 1) - i0 + 1,
-          .height_posts = half_up(window.j0 + window.height_posts - 1) - j0 + 1};
+          .width_posts =
+              static_cast<std::int32_t>(half_up(window.i0 + window.width_posts - 1) - i0 + 1),
+          .height_posts =
+              static_cast<std::int32_t>(half_up(window.j0 + window.height_posts - 1) - j0 + 1)};
 }
 
-std::size_t position(const PostWindow& window, std::int32_t i, std::int32_t j) {
+std::size_t position(const PostWindow& window, std::int64_t i, std::int64_t j) {
   return static_cast<std::size_t>(j - window.j0) * static_cast<std::size_t>(window.width_posts) +
          static_cast<std::size_t>(i - window.i0);
 }
@@ -67,8 +69,8 @@ void Heightfield::fill(const Lattice& lattice, const PostWindow& window, std::in
   std::vector<float> pulled_m(around.size());
   store_.read(coarser, around, pulled_m);
   fill(coarser, around, levels - 1, pulled_m);
-  for (std::int32_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
-    for (std::int32_t i = window.i0; i < window.i0 + window.width_posts; ++i) {
+  for (std::int64_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
+    for (std::int64_t i = window.i0; i < window.i0 + window.width_posts; ++i) {
       float& height_m = heights_m[position(window, i, j)];
       if (!std::isnan(height_m)) continue;
       const float south_west = pulled_m[position(around, half_down(i), half_down(j))];
@@ -91,7 +93,7 @@ float Heightfield::pole_height_m(std::int32_t zoom, std::size_t pole, std::int32
 // The whole row takes one height, data or none: it is one point of the globe.
 void Heightfield::fill_pole_rows(const Lattice& lattice, const PostWindow& window,
                                  std::int32_t levels, std::vector<float>& heights_m) const {
-  for (const std::int32_t j : {0, lattice.rows() - 1}) {
+  for (const std::int64_t j : {std::int64_t{0}, lattice.rows() - 1}) {
     if (!lattice.is_pole_row(j) || j < window.j0 || j >= window.j0 + window.height_posts) continue;
     const auto row =
         heights_m.begin() + static_cast<std::ptrdiff_t>(position(window, window.i0, j));

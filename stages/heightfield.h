@@ -37,11 +37,11 @@ struct WindowHeights {
   PostWindow window;
   std::vector<float> heights_m;     // all finite
   std::vector<std::uint8_t> valid;  // 1 where the post is no void
-  std::size_t index(std::int32_t i, std::int32_t j) const {
+  std::size_t index(std::int64_t i, std::int64_t j) const {
     return static_cast<std::size_t>(j - window.j0) * static_cast<std::size_t>(window.width_posts) +
            static_cast<std::size_t>(i - window.i0);
   }
-  float height_m(std::int32_t i, std::int32_t j) const { return heights_m[index(i, j)]; }
+  float height_m(std::int64_t i, std::int64_t j) const { return heights_m[index(i, j)]; }
 };
 
 class Heightfield {

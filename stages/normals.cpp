@@ -21,12 +21,12 @@ class PostFrame {
       columns_.push_back(up_at(lon_deg, 0));
     }
     for (std::int32_t k = 0; k < window.height_posts; ++k) {
-      const std::int32_t j = window.j0 + k;
+      const std::int64_t j = window.j0 + k;
       rows_.push_back(lattice.has_row(j) ? meridian_row(lattice.latitude_deg(j)) : Row{});
     }
   }
 
-  Vec3 position(std::int32_t i, std::int32_t j, double height_m) const {
+  Vec3 position(std::int64_t i, std::int64_t j, double height_m) const {
     const Row& row = rows_[static_cast<std::size_t>(j - window_.j0)];
     const Vec3& column = columns_[static_cast<std::size_t>(i - window_.i0)];
     const double radius = row.radius_m + height_m * row.up_radius;
@@ -52,13 +52,13 @@ class PostFrame {
 };
 
 Vec3 normal_at(const Lattice& lattice, const WindowHeights& heights, const PostFrame& frame,
-               const Post& post) {
+               const LatticePost& post) {
   if (lattice.is_pole_row(post.j)) return {0, 0, post.j == 0 ? -1.0 : 1.0};
-  const auto at = [&](std::int32_t i, std::int32_t j) {
+  const auto at = [&](std::int64_t i, std::int64_t j) {
     return frame.position(i, j, static_cast<double>(heights.height_m(i, j)));
   };
-  const std::int32_t south = lattice.has_row(post.j - 1) ? post.j - 1 : post.j;
-  const std::int32_t north = lattice.has_row(post.j + 1) ? post.j + 1 : post.j;
+  const std::int64_t south = lattice.has_row(post.j - 1) ? post.j - 1 : post.j;
+  const std::int64_t north = lattice.has_row(post.j + 1) ? post.j + 1 : post.j;
   return unit(cross(minus(at(post.i + 1, post.j), at(post.i - 1, post.j)),
                     minus(at(post.i, north), at(post.i, south))));
 }
@@ -78,7 +78,7 @@ Cell cell_of(const std::vector<double>& places, std::int32_t at) {
 
 }  // namespace
 
-Vec3 lattice_normal(const Lattice& lattice, const WindowHeights& heights, const Post& post) {
+Vec3 lattice_normal(const Lattice& lattice, const WindowHeights& heights, const LatticePost& post) {
   return normal_at(lattice, heights, PostFrame(lattice, heights.window), post);
 }
 
@@ -90,7 +90,7 @@ std::vector<OctNormal> tile_normals(const TilingScheme& scheme, const TileKey& k
   const PostFrame frame(lattice, heights.window);
   const auto normal_of = [&](std::int32_t i, std::int32_t j) {
     return normal_at(lattice, heights, frame,
-                     {.i = key.x * kTileIntervals + i, .j = key.y * kTileIntervals + j});
+                     {.i = first_post(key.x) + i, .j = first_post(key.y) + j});
   };
   std::vector<OctNormal> normals;
   normals.reserve(vertices.size());

@@ -14,7 +14,7 @@ namespace qmpipe {
 // The unit normal in ECEF of the surface through the post's four neighbours; on a pole row, which
 // has none beyond it, straight up. A pure function of the post and its neighbours' heights.
 // REQUIRES: the window holds the post's neighbours as far as the lattice has them.
-Vec3 lattice_normal(const Lattice& lattice, const WindowHeights& heights, const Post& post);
+Vec3 lattice_normal(const Lattice& lattice, const WindowHeights& heights, const LatticePost& post);
 
 // One for each of the tile's vertices; for one between posts, the mean of the normals of the four
 // around it, weighted by how near they are. REQUIRES: a halo of one post.

@@ -20,8 +20,8 @@ std::vector<std::int32_t> rounded(const std::vector<double>& exact) {
 
 PostGrid make_tile_grid(const TilingScheme& scheme, const TileKey& key) {
   const Lattice lattice(scheme, key.zoom);
-  const std::int32_t i0 = key.x * kTileIntervals;
-  const std::int32_t j0 = key.y * kTileIntervals;
+  const std::int64_t i0 = first_post(key.x);
+  const std::int64_t j0 = first_post(key.y);
   const double south_deg = lattice.latitude_deg(j0);
   const double height_deg = lattice.latitude_deg(j0 + kTileIntervals) - south_deg;
   PostGrid grid;

@@ -30,8 +30,8 @@ double bend(const PixelPoint& a, const PixelPoint& middle, const PixelPoint& b) 
 
 // A square of posts between four anchors, and the anchors halfway.
 struct Cell {
-  std::int32_t i = 0;
-  std::int32_t j = 0;
+  std::int64_t i = 0;
+  std::int64_t j = 0;
   std::int32_t size_posts = 0;
   PixelPoint sw, se, nw, ne;
   // The middles of the sides.
@@ -55,10 +55,10 @@ class CellFiller {
   void fill_block();
 
  private:
-  PixelPoint exact(std::int32_t i, std::int32_t j) const {
+  PixelPoint exact(std::int64_t i, std::int64_t j) const {
     return grid_.pixel_at(lattice_.longitude_deg(i), lattice_.latitude_deg(j)).value_or(kNowhere);
   }
-  PixelPoint& at(std::int32_t i, std::int32_t j) const {
+  PixelPoint& at(std::int64_t i, std::int64_t j) const {
     const auto row = static_cast<std::size_t>(j - block_.j0);
     return out_[row * static_cast<std::size_t>(block_.width_posts) +
                 static_cast<std::size_t>(i - block_.i0)];
@@ -109,13 +109,13 @@ bool CellFiller::is_off_raster(const Cell& cell) const {
 
 void CellFiller::interpolate(const Cell& cell, const PostRange& posts) const {
   const double step = 1.0 / cell.size_posts;
-  for (std::int32_t j = posts.j0; j < posts.j1; ++j) {
-    const double up = (j - cell.j) * step;
+  for (std::int64_t j = posts.j0; j < posts.j1; ++j) {
+    const double up = static_cast<double>(j - cell.j) * step;
     const PixelPoint west = between(cell.sw, cell.nw, up);
     const PixelPoint east = between(cell.se, cell.ne, up);
     PixelPoint* const row = &at(posts.i0, j);
-    for (std::int32_t i = posts.i0; i < posts.i1; ++i) {
-      row[i - posts.i0] = between(west, east, (i - cell.i) * step);
+    for (std::int64_t i = posts.i0; i < posts.i1; ++i) {
+      row[i - posts.i0] = between(west, east, static_cast<double>(i - cell.i) * step);
     }
   }
 }
@@ -124,7 +124,7 @@ void CellFiller::split(const Cell& cell) const {
   const std::int32_t half = cell.size_posts / 2;
   if (half == 0) {
     const PostRange posts = posts_of(cell);
-    for (std::int32_t j = posts.j0; j < posts.j1; ++j)
+    for (std::int64_t j = posts.j0; j < posts.j1; ++j)
       at(cell.i, j) = j == cell.j ? cell.sw : cell.nw;
     return;
   }
@@ -152,32 +152,32 @@ void CellFiller::split(const Cell& cell) const {
 }
 
 void CellFiller::fill_block() {
-  const std::int32_t last_cell_row = (lattice_.rows() - 1) / kAnchorPosts - 1;
-  const auto cell_row = [&](std::int32_t j) { return std::min(j / kAnchorPosts, last_cell_row); };
-  const std::int32_t a0 = block_.i0 / kAnchorPosts;
-  const std::int32_t a1 = (block_.i0 + block_.width_posts - 1) / kAnchorPosts;
-  const std::int32_t b0 = cell_row(block_.j0);
-  const std::int32_t b1 = cell_row(block_.j0 + block_.height_posts - 1);
+  const std::int64_t last_cell_row = (lattice_.rows() - 1) / kAnchorPosts - 1;
+  const auto cell_row = [&](std::int64_t j) { return std::min(j / kAnchorPosts, last_cell_row); };
+  const std::int64_t a0 = block_.i0 / kAnchorPosts;
+  const std::int64_t a1 = (block_.i0 + block_.width_posts - 1) / kAnchorPosts;
+  const std::int64_t b0 = cell_row(block_.j0);
+  const std::int64_t b1 = cell_row(block_.j0 + block_.height_posts - 1);
   constexpr std::int32_t kHalf = kAnchorPosts / 2;
   // Anchors along the northern side of the row of cells in hand, and halfway between them.
   const auto cells = static_cast<std::size_t>(a1 - a0) + 1;
   std::vector<PixelPoint> below(2 * cells + 1);
   std::vector<PixelPoint> beside(cells + 1);
   std::vector<PixelPoint> above(2 * cells + 1);
-  const auto along_row = [&](std::vector<PixelPoint>& row, std::int32_t j) {
+  const auto along_row = [&](std::vector<PixelPoint>& row, std::int64_t j) {
     for (std::size_t k = 0; k < row.size(); ++k) {
-      row[k] = exact(a0 * kAnchorPosts + static_cast<std::int32_t>(k) * kHalf, j);
+      row[k] = exact(a0 * kAnchorPosts + static_cast<std::int64_t>(k) * kHalf, j);
     }
   };
   along_row(below, b0 * kAnchorPosts);
-  for (std::int32_t b = b0; b <= b1; ++b) {
-    const std::int32_t j = b * kAnchorPosts;
+  for (std::int64_t b = b0; b <= b1; ++b) {
+    const std::int64_t j = b * kAnchorPosts;
     along_row(above, j + kAnchorPosts);
     for (std::size_t k = 0; k < beside.size(); ++k) {
-      beside[k] = exact((a0 + static_cast<std::int32_t>(k)) * kAnchorPosts, j + kHalf);
+      beside[k] = exact((a0 + static_cast<std::int64_t>(k)) * kAnchorPosts, j + kHalf);
     }
     for (std::size_t k = 0; k < cells; ++k) {
-      fill({.i = (a0 + static_cast<std::int32_t>(k)) * kAnchorPosts,
+      fill({.i = (a0 + static_cast<std::int64_t>(k)) * kAnchorPosts,
             .j = j,
             .size_posts = kAnchorPosts,
             .sw = below[2 * k],
@@ -197,7 +197,7 @@ void locate_separable(const RasterGrid& grid, const Lattice& lattice, const Post
                       std::span<PixelPoint> out) {
   std::vector<double> columns(static_cast<std::size_t>(block.width_posts));
   for (std::size_t k = 0; k < columns.size(); ++k) {
-    const double longitude_deg = lattice.longitude_deg(block.i0 + static_cast<std::int32_t>(k));
+    const double longitude_deg = lattice.longitude_deg(block.i0 + static_cast<std::int64_t>(k));
     columns[k] = grid.pixel_at(longitude_deg, 0).value_or(kNowhere).column;
   }
   for (std::int32_t r = 0; r < block.height_posts; ++r) {
@@ -233,7 +233,7 @@ bool touches_bounds(const GridInfo& info, const Lattice& lattice, const PostRang
   const double west_deg = b.west_deg - slack_deg;
   const double ahead_deg = lattice.longitude_deg(range.i0) - west_deg;
   const double turned_deg = ahead_deg - 360 * std::floor(ahead_deg / 360);
-  const double range_deg = (range.i1 - range.i0) * lattice.column_spacing_deg();
+  const double range_deg = static_cast<double>(range.i1 - range.i0) * lattice.column_spacing_deg();
   return turned_deg <= width_deg + 2 * slack_deg || turned_deg + range_deg >= 360;
 }
 

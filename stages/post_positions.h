@@ -26,10 +26,10 @@ void locate_posts(const RasterGrid& grid, const Lattice& lattice, const PostWind
 // True when the closed rectangle of the posts i0..i1, j0..j1 touches the bounds, widened by two
 // pixels and a ten-thousandth (they were measured at points).
 struct PostRange {
-  std::int32_t i0 = 0;
-  std::int32_t j0 = 0;
-  std::int32_t i1 = 0;
-  std::int32_t j1 = 0;
+  std::int64_t i0 = 0;
+  std::int64_t j0 = 0;
+  std::int64_t i1 = 0;
+  std::int64_t j1 = 0;
 };
 bool touches_bounds(const GridInfo& info, const Lattice& lattice, const PostRange& range);
 

@@ -63,7 +63,7 @@ struct Sampler::Impl {
   std::vector<double> pixels;
   std::vector<double> read_buffer;
   // By zoom and row. A value is a pure function of both.
-  std::map<std::pair<std::int32_t, std::int32_t>, float> pole_heights_m;
+  std::map<std::pair<std::int32_t, std::int64_t>, float> pole_heights_m;
 
   void sample_strip(const Lattice& lattice, const Strip& strip);
   void sample_block(std::size_t number, const Lattice& lattice, const Strip& block);
@@ -71,7 +71,7 @@ struct Sampler::Impl {
   void fetch(const RasterSource& source, const PixelWindow& needed);
   void read_piece(const RasterSource& source, const PixelWindow& piece, double* out,
                   std::int64_t stride);
-  float pole_height_m(const Lattice& lattice, std::int32_t j);
+  float pole_height_m(const Lattice& lattice, std::int64_t j);
 };
 
 void Sampler::Impl::read_piece(const RasterSource& source, const PixelWindow& piece, double* out,
@@ -199,8 +199,8 @@ void Sampler::Impl::sample_strip(const Lattice& lattice, const Strip& strip) {
   }
 }
 
-float Sampler::Impl::pole_height_m(const Lattice& lattice, std::int32_t j) {
-  const std::pair<std::int32_t, std::int32_t> key(lattice.zoom(), j);
+float Sampler::Impl::pole_height_m(const Lattice& lattice, std::int64_t j) {
+  const std::pair<std::int32_t, std::int64_t> key(lattice.zoom(), j);
   if (const auto known = pole_heights_m.find(key); known != pole_heights_m.end()) {
     return known->second;
   }
@@ -231,24 +231,28 @@ Sampler::Sampler(Sampler&&) noexcept = default;
 void Sampler::sample(const Lattice& lattice, const PostWindow& window, std::span<float> out) {
   QMPIPE_CHECK(out.size() == window.size());
   std::fill(out.begin(), out.end(), kVoid);
-  const std::int32_t j0 = std::max(window.j0, 0);
-  const std::int32_t j1 = std::min(window.j0 + window.height_posts, lattice.rows());
+  const std::int64_t j0 = std::max<std::int64_t>(window.j0, 0);
+  const std::int64_t j1 = std::min(window.j0 + window.height_posts, lattice.rows());
   if (j0 >= j1) return;
   const auto stride = static_cast<std::size_t>(window.width_posts);
-  const auto row_of = [&](std::int32_t j) {
+  const auto row_of = [&](std::int64_t j) {
     return out.subspan(static_cast<std::size_t>(j - window.j0) * stride);
   };
   // Cut where the columns wrap, so that a post is asked for under one name only.
   for (std::int32_t c = 0; c < window.width_posts;) {
-    const std::int32_t i = lattice.wrap_column(window.i0 + c);
-    const std::int32_t width = std::min(window.width_posts - c, lattice.columns() - i);
-    const PostWindow posts{.i0 = i, .j0 = j0, .width_posts = width, .height_posts = j1 - j0};
+    const std::int64_t i = lattice.wrap_column(window.i0 + c);
+    const auto width = static_cast<std::int32_t>(
+        std::min<std::int64_t>(window.width_posts - c, lattice.columns() - i));
+    const PostWindow posts{.i0 = i,
+                           .j0 = j0,
+                           .width_posts = width,
+                           .height_posts = static_cast<std::int32_t>(j1 - j0)};
     impl_->sample_strip(
         lattice,
         {.posts = posts, .out = row_of(j0).subspan(static_cast<std::size_t>(c)), .stride = stride});
     c += width;
   }
-  for (const std::int32_t j : {0, lattice.rows() - 1}) {
+  for (const std::int64_t j : {std::int64_t{0}, lattice.rows() - 1}) {
     if (!lattice.is_pole_row(j) || j < j0 || j >= j1) continue;
     const std::span<float> row = row_of(j).first(stride);
     std::fill(row.begin(), row.end(), impl_->pole_height_m(lattice, j));
@@ -257,7 +261,7 @@ void Sampler::sample(const Lattice& lattice, const PostWindow& window, std::span
 
 bool Sampler::may_cover(const Lattice& lattice, const PostWindow& window) const {
   const PostRange range{.i0 = window.i0,
-                        .j0 = std::max(window.j0, 0),
+                        .j0 = std::max<std::int64_t>(window.j0, 0),
                         .i1 = window.i0 + window.width_posts - 1,
                         .j1 = std::min(window.j0 + window.height_posts, lattice.rows()) - 1};
   if (range.j0 > range.j1) return false;

@@ -29,8 +29,8 @@ std::int32_t below(std::mt19937_64& random, std::int32_t end) {
 }
 
 // Heights with patches of voids, straight from the seed.
-float patchy_height_m(std::uint64_t seed, const Lattice& lattice, std::int32_t i, std::int32_t j) {
-  const std::int32_t column = lattice.wrap_column(i);
+float patchy_height_m(std::uint64_t seed, const Lattice& lattice, std::int64_t i, std::int64_t j) {
+  const std::int64_t column = lattice.wrap_column(i);
   const bool is_hole =
       post_noise(seed + 1, column >> 4, j >> 4) < 0.4 || post_noise(seed + 2, column, j) < 0.02;
   return is_hole ? kVoid : globe_height_m(seed, lattice, column, j);
@@ -88,8 +88,8 @@ World make_patchy_world(std::uint64_t seed, const TilingScheme& scheme, std::int
 PostWindow random_window(std::mt19937_64& random, const Lattice& lattice) {
   const std::int32_t width = 2 + below(random, 70);
   const std::int32_t height = 2 + below(random, 70);
-  const std::array<std::int32_t, 3> columns = {-30, lattice.columns() - 30, 400};
-  const std::array<std::int32_t, 3> rows = {-1, lattice.rows() - height + 1, 200};
+  const std::array<std::int64_t, 3> columns = {-30, lattice.columns() - 30, 400};
+  const std::array<std::int64_t, 3> rows = {-1, lattice.rows() - height + 1, 200};
   return {.i0 = columns[random() % 3] + below(random, 30),
           .j0 = std::min(rows[random() % 3] + below(random, 20), lattice.rows() - height + 1),
           .width_posts = width,
@@ -109,8 +109,8 @@ TEST(Heightfield, WindowsAgreeOnEveryPostTheyShare) {
         const WindowHeights one = field.window(zoom, random_window(random, lattice));
         // A window of one post sees nothing around it.
         for (int k = 0; k < 60; ++k) {
-          const std::int32_t i = one.window.i0 + below(random, one.window.width_posts);
-          const std::int32_t j = one.window.j0 + below(random, one.window.height_posts);
+          const std::int64_t i = one.window.i0 + below(random, one.window.width_posts);
+          const std::int64_t j = one.window.j0 + below(random, one.window.height_posts);
           const std::int32_t turns = below(random, 3) - 1;
           const WindowHeights alone = field.window(zoom, {i + turns * lattice.columns(), j, 1, 1});
           ASSERT_TRUE(same_bits(one.height_m(i, j), alone.heights_m[0]))
@@ -130,8 +130,8 @@ TEST(Heightfield, ValidPostsKeepTheirHeightsAndVoidsAreFinite) {
   for (const std::int32_t y : {0, 2, 3}) {
     const WindowHeights heights = field.window(2, Lattice::tile_window({2, 7, y}, 1));
     const PostWindow& window = heights.window;
-    for (std::int32_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
-      for (std::int32_t i = window.i0; i < window.i0 + window.width_posts; ++i) {
+    for (std::int64_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
+      for (std::int64_t i = window.i0; i < window.i0 + window.width_posts; ++i) {
         ASSERT_TRUE(std::isfinite(heights.height_m(i, j)));
         if (!lattice.has_row(j)) continue;
         const float stored_m = patchy_height_m(5, lattice, i, j);
@@ -194,8 +194,8 @@ Island make_island(std::mt19937_64& random, const HeightOf& height_of) {
   island.data = {bx * 256 + below(random, 120), by * 256 + below(random, 120),
                  8 + below(random, 120), 8 + below(random, 120)};
   std::vector<float> block(256 * 256, kVoid);
-  for (std::int32_t j = island.data.j0; j < island.data.j0 + island.data.height_posts; ++j) {
-    for (std::int32_t i = island.data.i0; i < island.data.i0 + island.data.width_posts; ++i) {
+  for (std::int64_t j = island.data.j0; j < island.data.j0 + island.data.height_posts; ++j) {
+    for (std::int64_t i = island.data.i0; i < island.data.i0 + island.data.width_posts; ++i) {
       block[static_cast<std::size_t>((j - by * 256) * 256 + i - bx * 256)] = height_of(i, j);
     }
   }
@@ -205,9 +205,11 @@ Island make_island(std::mt19937_64& random, const HeightOf& height_of) {
 }
 
 // Posts from the data's rectangle, in the larger direction.
-std::int32_t distance_posts(const PostWindow& data, std::int32_t i, std::int32_t j) {
-  const std::int32_t di = std::max({data.i0 - i, i - (data.i0 + data.width_posts - 1), 0});
-  const std::int32_t dj = std::max({data.j0 - j, j - (data.j0 + data.height_posts - 1), 0});
+std::int64_t distance_posts(const PostWindow& data, std::int64_t i, std::int64_t j) {
+  const std::int64_t di =
+      std::max({data.i0 - i, i - (data.i0 + data.width_posts - 1), std::int64_t{0}});
+  const std::int64_t dj =
+      std::max({data.j0 - j, j - (data.j0 + data.height_posts - 1), std::int64_t{0}});
   return std::max(di, dj);
 }
 
@@ -215,15 +217,15 @@ TEST(Heightfield, PullFadesToTheBaseWithin128Posts) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
-    const Island island = make_island(random, [](std::int32_t, std::int32_t) { return 1000.0F; });
+    const Island island = make_island(random, [](std::int64_t, std::int64_t) { return 1000.0F; });
     const Heightfield field = island.world.heightfield({.base_height_m = -200});
     const PostWindow& data = island.data;
     const WindowHeights heights = field.window(
         8, {data.i0 - 180, data.j0 - 180, data.width_posts + 360, data.height_posts + 360});
     const PostWindow& window = heights.window;
-    for (std::int32_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
-      for (std::int32_t i = window.i0; i < window.i0 + window.width_posts; ++i) {
-        const std::int32_t distance = distance_posts(data, i, j);
+    for (std::int64_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
+      for (std::int64_t i = window.i0; i < window.i0 + window.width_posts; ++i) {
+        const std::int64_t distance = distance_posts(data, i, j);
         const float height_m = heights.height_m(i, j);
         ASSERT_TRUE(height_m >= -200.01F && height_m <= 1000.01F);
         if (distance == 0) {
@@ -249,15 +251,16 @@ TEST(Heightfield, PullHasNoJumpAtTheEdgeOfTheData) {
     const double slope_i = below(random, 21) - 10;
     const double slope_j = below(random, 21) - 10;
     const double slope = std::abs(slope_i) + std::abs(slope_j);
-    Island island = make_island(random, [&](std::int32_t i, std::int32_t j) {
-      return static_cast<float>(2000 + slope_i * (i % 256 - 100) + slope_j * (j % 256 - 100));
+    Island island = make_island(random, [&](std::int64_t i, std::int64_t j) {
+      return static_cast<float>(2000 + slope_i * static_cast<double>(i % 256 - 100) +
+                                slope_j * static_cast<double>(j % 256 - 100));
     });
     const PostWindow& data = island.data;
     const Heightfield field = island.world.heightfield({.base_height_m = 0});
     const WindowHeights heights =
         field.window(8, {data.i0 - 2, data.j0 - 2, data.width_posts + 4, data.height_posts + 4});
-    for (std::int32_t j = data.j0; j < data.j0 + data.height_posts; ++j) {
-      for (std::int32_t i = data.i0; i < data.i0 + data.width_posts; ++i) {
+    for (std::int64_t j = data.j0; j < data.j0 + data.height_posts; ++j) {
+      for (std::int64_t i = data.i0; i < data.i0 + data.width_posts; ++i) {
         const double here_m = static_cast<double>(heights.height_m(i, j));
         for (std::int32_t k = 0; k < 9; ++k) {
           const double there_m =
@@ -285,8 +288,8 @@ TEST(MemoryLatticeStore, ReadsWhatWasWrittenAroundTheGlobe) {
       std::vector<float> out(window.size(), -1.0F);
       store->read(lattice, window, out);
       std::size_t k = 0;
-      for (std::int32_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
-        for (std::int32_t i = window.i0; i < window.i0 + window.width_posts; ++i, ++k) {
+      for (std::int64_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
+        for (std::int64_t i = window.i0; i < window.i0 + window.width_posts; ++i, ++k) {
           const float expected = lattice.has_row(j) ? patchy_height_m(9, lattice, i, j) : kVoid;
           ASSERT_TRUE(std::isnan(expected) ? std::isnan(out[k]) : same_bits(out[k], expected));
         }

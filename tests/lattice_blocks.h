@@ -38,8 +38,8 @@ inline bool same_height(float a, float b) {
 }
 
 inline PostWindow window_of_block(const TileKey& block) {
-  return {.i0 = block.x * kBlockPosts,
-          .j0 = block.y * kBlockPosts,
+  return {.i0 = first_post_of_block(block.x),
+          .j0 = first_post_of_block(block.y),
           .width_posts = kBlockPosts,
           .height_posts = kBlockPosts};
 }
@@ -49,11 +49,11 @@ class BlockModel {
  public:
   void put(const TileKey& key, const std::vector<float>& heights_m) { blocks_[key] = heights_m; }
   const std::map<TileKey, std::vector<float>>& blocks() const { return blocks_; }
-  float height_m(const Lattice& lattice, std::int32_t i, std::int32_t j) const {
+  float height_m(const Lattice& lattice, std::int64_t i, std::int64_t j) const {
     if (!lattice.has_row(j)) return kVoidHeight;
-    const std::int32_t column = ((i % lattice.columns()) + lattice.columns()) % lattice.columns();
+    const std::int64_t column = ((i % lattice.columns()) + lattice.columns()) % lattice.columns();
     const auto it =
-        blocks_.find({.zoom = lattice.zoom(), .x = column / kBlockPosts, .y = j / kBlockPosts});
+        blocks_.find({.zoom = lattice.zoom(), .x = block_of_post(column), .y = block_of_post(j)});
     if (it == blocks_.end()) return kVoidHeight;
     return it
         ->second[static_cast<std::size_t>((j % kBlockPosts) * kBlockPosts + column % kBlockPosts)];
@@ -65,8 +65,8 @@ class BlockModel {
     store.read(lattice, window, out);
     std::size_t count = 0;
     std::size_t k = 0;
-    for (std::int32_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
-      for (std::int32_t i = window.i0; i < window.i0 + window.width_posts; ++i, ++k) {
+    for (std::int64_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
+      for (std::int64_t i = window.i0; i < window.i0 + window.width_posts; ++i, ++k) {
         if (!same_height(out[k], height_m(lattice, i, j))) ++count;
       }
     }

@@ -63,7 +63,7 @@ TEST(Normals, NeighboursWriteTheSameBytesAlongEveryBorder) {
 }
 
 // A plane of given slopes through a post, in the metres of its own east and north.
-WindowHeights tilted_plane(const Lattice& lattice, const Post& post, double slope_east,
+WindowHeights tilted_plane(const Lattice& lattice, const LatticePost& post, double slope_east,
                            double slope_north) {
   const double pi = std::acos(-1.0);
   const double lat = lattice.latitude_deg(post.j) * pi / 180;
@@ -74,12 +74,12 @@ WindowHeights tilted_plane(const Lattice& lattice, const Post& post, double slop
   WindowHeights plane;
   plane.window = {post.i - 1, post.j - 1, 3, 3};
   plane.valid.assign(9, 1);
-  for (std::int32_t j = post.j - 1; j <= post.j + 1; ++j) {
-    for (std::int32_t i = post.i - 1; i <= post.i + 1; ++i) {
+  for (std::int64_t j = post.j - 1; j <= post.j + 1; ++j) {
+    for (std::int64_t i = post.i - 1; i <= post.i + 1; ++i) {
       const double d_lat = lattice.latitude_deg(j) * pi / 180 - lat;
       const double north_m = 6378137.0 * (1 - e2) / std::pow(w, 1.5) * d_lat;
-      plane.heights_m.push_back(
-          static_cast<float>(slope_east * east_m * (i - post.i) + slope_north * north_m));
+      plane.heights_m.push_back(static_cast<float>(
+          slope_east * east_m * static_cast<double>(i - post.i) + slope_north * north_m));
     }
   }
   return plane;
@@ -91,9 +91,9 @@ TEST(Normals, ATiltedPlaneHasItsSlopesInEastNorthUp) {
     for (std::uint64_t seed = 1; seed <= 300; ++seed) {
       SCOPED_TRACE("seed " + std::to_string(seed));
       std::mt19937_64 random(seed);
-      const Post post = {
-          static_cast<std::int32_t>(random() % static_cast<std::uint64_t>(lattice.columns())),
-          lattice.rows() / 10 + static_cast<std::int32_t>(
+      const LatticePost post = {
+          static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(lattice.columns())),
+          lattice.rows() / 10 + static_cast<std::int64_t>(
                                     random() % static_cast<std::uint64_t>(lattice.rows() * 4 / 5))};
       const double east = static_cast<double>(random() % 401) / 100 - 2;
       const double north = static_cast<double>(random() % 401) / 100 - 2;
@@ -118,10 +118,10 @@ TEST(Normals, FlatGroundPointsUpAndPolesPointAlongTheAxis) {
   for (const TileKey key : {TileKey{1, 0, 0}, TileKey{1, 3, 1}}) {
     const WindowHeights heights = field.window(1, Lattice::tile_window(key, 1));
     for (std::int32_t k = 0; k < kTilePosts; k += 16) {
-      const Post post = {key.x * 256 + k, key.y * 256 + (k * 7) % kTilePosts};
+      const LatticePost post = {key.x * 256 + k, key.y * 256 + (k * 7) % kTilePosts};
       const Vec3 up = up_at(lattice.longitude_deg(post.i), lattice.latitude_deg(post.j));
       ASSERT_GT(dot(lattice_normal(lattice, heights, post), up), 1 - 1e-9);
-      const std::int32_t pole = key.y == 0 ? 0 : lattice.rows() - 1;
+      const std::int64_t pole = key.y == 0 ? 0 : lattice.rows() - 1;
       ASSERT_EQ(lattice_normal(lattice, heights, {post.i, pole}),
                 (Vec3{0, 0, key.y == 0 ? -1.0 : 1.0}));
     }
@@ -140,7 +140,8 @@ TEST(Normals, BytesAreTheEncodedLatticeNormalsInTheOrderAsked) {
   const auto normals = tile_normals(kMercator, key, grid, heights, vertices);
   ASSERT_EQ(normals.size(), vertices.size());
   for (std::size_t k = 0; k < vertices.size(); ++k) {
-    const Post post = {256 + grid.column(vertices[k].post), 256 + grid.row(vertices[k].post)};
+    const LatticePost post = {256 + grid.column(vertices[k].post),
+                              256 + grid.row(vertices[k].post)};
     EXPECT_EQ(normals[k], encode_oct_normal(lattice_normal(Lattice(kMercator, 1), heights, post)));
   }
 }

@@ -18,9 +18,9 @@ constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 constexpr std::array kReductions = {Reduction::kMean, Reduction::kSubsample, Reduction::kMax,
                                     Reduction::kMin};
 
-float fine_height_m(std::uint64_t seed, const Lattice& lattice, std::int32_t i, std::int32_t j) {
+float fine_height_m(std::uint64_t seed, const Lattice& lattice, std::int64_t i, std::int64_t j) {
   if (!lattice.has_row(j)) return kVoid;
-  const std::int32_t column = lattice.wrap_column(i);
+  const std::int64_t column = lattice.wrap_column(i);
   const double share = seed % 2 == 0 ? 0.3 : 0.85;
   if (post_noise(seed + 1, column, j) < share) return kVoid;
   return globe_height_m(seed, lattice, column, j);

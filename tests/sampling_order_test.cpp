@@ -28,7 +28,7 @@ RasterInfo large_grid(std::int64_t block_width, std::int64_t block_height) {
 
 Lattice lattice_for(std::int32_t zoom) { return {TilingScheme(Projection::kGeodetic), zoom}; }
 
-std::int32_t whole(const Lattice& lattice) { return lattice.columns() / kBlockPosts; }
+std::int32_t whole(const Lattice& lattice) { return lattice.scheme().columns(lattice.zoom()); }
 
 TEST(SamplingOrder, AFrontOfStripsIsTwiceTheRowsOfABlock) {
   const Lattice lattice = lattice_for(10);

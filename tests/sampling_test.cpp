@@ -32,8 +32,8 @@ bool same_bits(float a, float b) { return a == b || (std::isnan(a) && std::isnan
 PostWindow around(const Lattice& lattice, double longitude_deg, double latitude_deg, int width,
                   int height) {
   const double spacing = lattice.column_spacing_deg();
-  return {.i0 = static_cast<int>(std::floor((longitude_deg + 180) / spacing)) - width / 2,
-          .j0 = static_cast<int>(std::floor((latitude_deg + 90) / spacing)) - height / 2,
+  return {.i0 = static_cast<std::int64_t>(std::floor((longitude_deg + 180) / spacing)) - width / 2,
+          .j0 = static_cast<std::int64_t>(std::floor((latitude_deg + 90) / spacing)) - height / 2,
           .width_posts = width,
           .height_posts = height};
 }
@@ -180,7 +180,7 @@ TEST(Sampling, APostDoesNotDependOnItsWindowAcrossTheAntimeridian) {
   fixture.geotransform = {{0, 1, 0, 90, 0, -1}};
   write_raster(file_in(folder, "world.tif"), fixture);
   const Lattice lattice(kGeodetic, 1);
-  const int columns = lattice.columns();
+  const std::int64_t columns = lattice.columns();
   expect_pure({file_in(folder, "world.tif")}, lattice,
               {.i0 = columns - 100, .j0 = 100, .width_posts = 300, .height_posts = 60}, 3);
   // The raster's own seam, in the middle of the lattice.
@@ -304,7 +304,7 @@ TEST(Sampling, APoleHasOneHeight) {
   write_raster(file_in(folder, "a.tif"), fixture);
   Sampler sampler = sampler_of({file_in(folder, "a.tif")});
   const Lattice lattice(kGeodetic, 0);
-  for (const int j : {0, lattice.rows() - 1}) {
+  for (const std::int64_t j : {std::int64_t{0}, lattice.rows() - 1}) {
     const std::vector<float> row =
         sampled(sampler, lattice, {.i0 = 0, .j0 = j, .width_posts = 512, .height_posts = 1});
     EXPECT_FALSE(std::isnan(row[0]));
@@ -317,7 +317,7 @@ TEST(Sampling, RowsOutsideTheLatticeAreVoid) {
   write_raster(file_in(folder, "a.tif"), plane_in_degrees());
   Sampler sampler = sampler_of({file_in(folder, "a.tif")});
   const Lattice lattice(kGeodetic, 0);
-  for (const int j : {-3, lattice.rows() + 1}) {
+  for (const std::int64_t j : {std::int64_t{-3}, lattice.rows() + 1}) {
     for (const float height :
          sampled(sampler, lattice, {.i0 = 270, .j0 = j, .width_posts = 20, .height_posts = 2})) {
       EXPECT_TRUE(std::isnan(height));

@@ -42,13 +42,13 @@ Survey survey_of(const std::string& path, std::int32_t threads, std::int64_t cac
 std::int64_t comfortable_bytes(const std::string& path, std::int32_t threads) {
   const std::vector<RasterInfo> infos = describe_inputs({.inputs = {path}});
   const Lattice lattice(TilingScheme(Projection::kGeodetic), chosen_sampling_zoom({}, infos));
-  return front_bytes(lattice, infos, threads, lattice.columns() / kBlockPosts);
+  return front_bytes(lattice, infos, threads, lattice.scheme().columns(lattice.zoom()));
 }
 
 // The posts on the raster and a few around it.
 PostWindow window_around(const Lattice& lattice) {
-  return {.i0 = static_cast<std::int32_t>(lattice.column_at(19)),
-          .j0 = static_cast<std::int32_t>(lattice.row_at(38)),
+  return {.i0 = static_cast<std::int64_t>(lattice.column_at(19)),
+          .j0 = static_cast<std::int64_t>(lattice.row_at(38)),
           .width_posts = static_cast<std::int32_t>(17 / lattice.column_spacing_deg()),
           .height_posts = static_cast<std::int32_t>(13 / lattice.column_spacing_deg())};
 }

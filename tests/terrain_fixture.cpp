@@ -126,15 +126,15 @@ std::vector<float> random_terrain(Terrain terrain, std::mt19937_64& random) {
   return heights_m;
 }
 
-double post_noise(std::uint64_t seed, std::int32_t i, std::int32_t j) {
+double post_noise(std::uint64_t seed, std::int64_t i, std::int64_t j) {
   std::uint64_t h = seed * 0x9E3779B97F4A7C15ULL ^ static_cast<std::uint32_t>(i) ^
                     static_cast<std::uint64_t>(static_cast<std::uint32_t>(j)) << 32U;
   for (int k = 0; k < 2; ++k) h = (h ^ h >> 31U) * 0xBF58476D1CE4E5B9ULL;
   return static_cast<double>((h ^ h >> 29U) >> 11U) * 0x1p-53;
 }
 
-float globe_height_m(std::uint64_t seed, const Lattice& lattice, std::int32_t i, std::int32_t j) {
-  const std::int32_t column = lattice.wrap_column(i);
+float globe_height_m(std::uint64_t seed, const Lattice& lattice, std::int64_t i, std::int64_t j) {
+  const std::int64_t column = lattice.wrap_column(i);
   const double lon = lattice.longitude_deg(column) / 57.29577951308232;
   const double lat = lattice.latitude_deg(j) / 57.29577951308232;
   const double smooth = 1000 * std::sin(3 * lon + static_cast<double>(seed)) * std::cos(5 * lat) +

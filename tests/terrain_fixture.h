@@ -29,9 +29,9 @@ std::vector<float> random_terrain(Terrain terrain, std::mt19937_64& random);
 
 // The height of a post of the globe: smooth in the large, rough in the small, the same for both
 // names of a column (i and i + columns).
-float globe_height_m(std::uint64_t seed, const Lattice& lattice, std::int32_t i, std::int32_t j);
+float globe_height_m(std::uint64_t seed, const Lattice& lattice, std::int64_t i, std::int64_t j);
 // A number in [0, 1) from a post.
-double post_noise(std::uint64_t seed, std::int32_t i, std::int32_t j);
+double post_noise(std::uint64_t seed, std::int64_t i, std::int64_t j);
 
 // Writes every block of a zoom; height_of(i, j) gives a post, NaN for a void.
 template <class HeightOf>

@@ -172,10 +172,10 @@ TEST(Lattice, APostHasTheSameCoordinatesInEveryZoomBitForBit) {
       ASSERT_EQ(fine.columns(), 2 * coarse.columns());
       ASSERT_EQ(fine.rows(), 2 * coarse.rows() - 1);
       for (int k = 0; k < 2000; ++k) {
-        const auto i = static_cast<std::int32_t>(
+        const auto i = static_cast<std::int64_t>(
             random() % (static_cast<std::uint64_t>(coarse.columns()) + 1));
         const auto j =
-            static_cast<std::int32_t>(random() % static_cast<std::uint64_t>(coarse.rows()));
+            static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(coarse.rows()));
         ASSERT_TRUE(same_bits(coarse.longitude_deg(i), fine.longitude_deg(2 * i))) << zoom;
         ASSERT_TRUE(same_bits(coarse.latitude_deg(j), fine.latitude_deg(2 * j))) << zoom;
       }
@@ -195,7 +195,7 @@ TEST(Lattice, CoordinatesAscendAndEndAtTheSchemesLimits) {
       EXPECT_EQ(lattice.latitude_deg(lattice.rows() - 1), limit_deg);
       EXPECT_EQ(lattice.latitude_deg((lattice.rows() - 1) / 2), 0);
       for (std::int32_t k = 1; k <= 256; ++k) {
-        const std::int32_t j = lattice.rows() - 1 - k;
+        const std::int64_t j = lattice.rows() - 1 - k;
         ASSERT_LT(lattice.latitude_deg(j), lattice.latitude_deg(j + 1));
         ASSERT_EQ(lattice.latitude_deg(k), -lattice.latitude_deg(j));
         ASSERT_LT(lattice.longitude_deg(k - 1), lattice.longitude_deg(k));
@@ -222,7 +222,7 @@ TEST(Lattice, WrapColumnIsTheRemainder) {
   const Lattice lattice(kGeodetic, 0);
   ASSERT_EQ(lattice.columns(), 512);
   for (std::int32_t i = -2000; i <= 2000; ++i) {
-    const std::int32_t wrapped = lattice.wrap_column(i);
+    const std::int64_t wrapped = lattice.wrap_column(i);
     ASSERT_TRUE(wrapped >= 0 && wrapped < 512);
     ASSERT_EQ((wrapped - i) % 512, 0);
   }
@@ -233,12 +233,12 @@ TEST(Lattice, ColumnAtAndRowAtInvertTheCoordinates) {
     for (const std::int32_t zoom : {0, 5, 14}) {
       const Lattice lattice(scheme, zoom);
       for (std::int32_t k = 0; k <= 64; ++k) {
-        const std::int32_t i = lattice.columns() / 64 * k;
-        const std::int32_t j = (lattice.rows() - 1) / 64 * k;
-        ASSERT_NEAR(lattice.column_at(lattice.longitude_deg(i)), i, 1e-6);
-        ASSERT_NEAR(lattice.row_at(lattice.latitude_deg(j)), j, 1e-6);
+        const std::int64_t i = lattice.columns() / 64 * k;
+        const std::int64_t j = (lattice.rows() - 1) / 64 * k;
+        ASSERT_NEAR(lattice.column_at(lattice.longitude_deg(i)), static_cast<double>(i), 1e-6);
+        ASSERT_NEAR(lattice.row_at(lattice.latitude_deg(j)), static_cast<double>(j), 1e-6);
       }
-      ASSERT_NEAR(lattice.row_at(90), lattice.rows() - 1, 1e-6);
+      ASSERT_NEAR(lattice.row_at(90), static_cast<double>(lattice.rows() - 1), 1e-6);
     }
   }
 }

@@ -82,8 +82,8 @@ HeightSource smooth_globe(TilingScheme scheme) {
   return [scheme](std::int32_t zoom, const PostWindow& window) {
     const Lattice lattice(scheme, zoom);
     WindowHeights heights{.window = window, .heights_m = {}, .valid = {}};
-    for (std::int32_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
-      for (std::int32_t i = window.i0; i < window.i0 + window.width_posts; ++i) {
+    for (std::int64_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
+      for (std::int64_t i = window.i0; i < window.i0 + window.width_posts; ++i) {
         constexpr double kRadPerDeg = std::numbers::pi / 180;
         const bool exists = lattice.has_row(j);
         // Wrapped, so that both names of a column give the same bits.
