@@ -26,6 +26,18 @@ inline SegmentIdentity detail_identity() {
           .remedy = "build the model again, or take a copy that is whole"};
 }
 
+// Zstd makes megabytes of a few bytes, so a small file could fill any memory. No file's arrays are
+// larger than this; the writer lengthens one whose arrays are almost nothing but zeros.
+constexpr std::uint64_t most_array_bytes(std::uint64_t file_bytes) {
+  constexpr std::uint64_t kAlways = std::uint64_t{64} << 20U;
+  constexpr std::uint64_t kTimes = 512;
+  constexpr std::uint64_t kLargestFile = std::uint64_t{1} << 52U;
+  return kAlways + kTimes * std::min(file_bytes, kLargestFile);
+}
+constexpr std::uint64_t least_file_bytes(std::uint64_t array_bytes) {
+  return (array_bytes - std::min(array_bytes, most_array_bytes(0)) + 511) / 512;
+}
+
 // REQUIRES: words > 0.
 constexpr std::uint64_t chunk_words_of(std::uint64_t words) {
   return std::min<std::uint64_t>(words, kMaxChunkWords);

@@ -138,6 +138,12 @@ Result<DetailModel> read_detail_file(const std::filesystem::path& path) {
   const auto opened = open(path);
   if (!opened) return opened.error();
   const auto lengths = array_lengths(opened->summary);
+  std::uint64_t words = 0;
+  for (const std::uint64_t length : lengths) words += std::min(length, opened->bytes << 10U);
+  if (words > most_array_bytes(opened->bytes) / sizeof(std::uint32_t)) {
+    return opened->file.refused(
+        fmt::format("it claims more than its {} bytes can hold", opened->bytes));
+  }
   DetailArrays arrays;
   for (std::size_t k = 0; k < kDetailArrayCount; ++k) {
     auto values = read_array(path, opened->file, kDetailArrayNames[k], lengths[k], opened->bytes);

@@ -48,7 +48,9 @@ void write_detail_file(const std::filesystem::path& path, const DetailModel& mod
   for (std::size_t k = 0; k < kDetailArrayCount; ++k) {
     write_array(file, kDetailArrayNames[k], arrays[k]);
   }
-  write_file_atomically(path, file.finish_whole());
+  std::uint64_t array_bytes = 0;
+  for (const std::vector<std::uint32_t>& words : arrays) array_bytes += 4 * words.size();
+  write_file_atomically(path, file.finish_whole(least_file_bytes(array_bytes)));
 }
 
 }  // namespace qmpipe

@@ -94,10 +94,17 @@ std::optional<Error> check_seal(const std::filesystem::path& path) {
   if (!seal) return seal.error();
   if (hash64(*seal, kSeed) != seal_hash) return refused("the file is damaged in its seal");
   std::uint64_t hash = kSeed;
+  std::uint64_t at = 0;
   for (std::uint64_t k = 0; k < count; ++k) {
     const std::uint8_t* entry = seal->data() + k * kRangeBytes;
-    const auto part = read_file_range(path, load_little_endian<std::uint64_t>(entry),
-                                      load_little_endian<std::uint64_t>(entry + kWord));
+    const auto offset = load_little_endian<std::uint64_t>(entry);
+    const auto bytes = load_little_endian<std::uint64_t>(entry + kWord);
+    // Overlapping parts would have the same bytes read again and again.
+    if (bytes == 0 || offset < at || offset > body_bytes || bytes > body_bytes - offset) {
+      return refused("the file is damaged: the parts under its seal are out of order");
+    }
+    at = offset + bytes;
+    const auto part = read_file_range(path, offset, bytes);
     if (!part) return part.error();
     hash = hash64(*part, hash);
   }

@@ -5,8 +5,9 @@
 // that tells what it is: of a store's file `scheme` ("geodetic" or "mercator"); chunked datasets,
 // and small ones of numbers beside them. A store's file has one chunked dataset, whose chunks are
 // outside the seal and carry hashes of their own. HDF5's ids are 64-bit integers here, so that
-// its headers stay out of ours. Different objects may be used from different threads at once
-// where HDF5 was built thread-safe.
+// its headers stay out of ours. The HDF5 library only writes: a seal is no proof against malice, and
+// the library trusts what it reads. Different writers may be used from different threads at once
+// where HDF5 was built thread-safe, readers anywhere.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +19,7 @@
 
 #include "formats/file_seal.h"
 #include "formats/hdf5_handle.h"
+#include "formats/hdf5_structure.h"
 #include "formats/result.h"
 #include "scheduler/tiling_scheme.h"
 
@@ -36,11 +38,6 @@ struct SegmentIdentity {
   const char* remedy = "";
 };
 SegmentIdentity store_identity(std::int32_t format_version, const TilingScheme& scheme);
-
-struct LocatedChunk {
-  std::uint64_t row = 0;  // the chunk's first, along the first dimension
-  ByteRange range;
-};
 
 // Throws IoError, naming the file, when HDF5 fails (it never should: there is no file yet).
 class Hdf5SegmentWriter {
@@ -69,8 +66,9 @@ class Hdf5SegmentWriter {
   void write_values(const char* name, std::size_t columns, const std::vector<T>& values);
   // The chunks are outside the seal. REQUIRES: one chunked dataset.
   Finished finish();
-  // The whole file, its chunks under the seal as well.
-  std::vector<std::uint8_t> finish_whole();
+  // The whole file, its chunks under the seal as well; with zeros, which HDF5 ignores, to at least so
+  // many bytes.
+  std::vector<std::uint8_t> finish_whole(std::size_t least_bytes);
 
  private:
   Hdf5Handle made(std::int64_t id, Hdf5Handle::Close close) const;
@@ -96,7 +94,7 @@ struct ChunkedDataset {
 // Every Error names the file and the remedy.
 class Hdf5SegmentReader {
  public:
-  // Refuses a file whose seal is broken, that HDF5 cannot open, or that says it is something else.
+  // Refuses a file whose seal is broken, that is no HDF5 file of ours, or says it is something else.
   static Result<Hdf5SegmentReader> open(const std::filesystem::path& path,
                                         const SegmentIdentity& identity);
 
@@ -116,16 +114,14 @@ class Hdf5SegmentReader {
                                  std::size_t limit_bytes) const;
 
  private:
-  Hdf5SegmentReader(std::filesystem::path path, Hdf5Handle file, const char* remedy)
-      : path_(std::move(path)), file_(std::move(file)), remedy_(remedy) {}
-  Error refused_by_hdf5(const std::string& what) const;
+  Hdf5SegmentReader(std::filesystem::path path, Hdf5Structure structure, const char* remedy)
+      : path_(std::move(path)), structure_(std::move(structure)), remedy_(remedy) {}
+  Error refused_unread(const std::string& what, const Error& cause) const;
   Result<std::int32_t> version_attribute() const;
   std::optional<Error> check_header(const SegmentIdentity& identity) const;
-  std::optional<Error> read_shapes(const Hdf5Handle& data, const std::string& what,
-                                   ChunkedDataset& dataset) const;
 
   std::filesystem::path path_;
-  Hdf5Handle file_;
+  Hdf5Structure structure_;
   const char* remedy_;
 };
 

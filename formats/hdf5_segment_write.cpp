@@ -1,5 +1,6 @@
 #include <hdf5.h>
 
+#include <algorithm>
 #include <array>
 #include <type_traits>
 #include <utility>
@@ -63,6 +64,8 @@ Hdf5Handle Hdf5SegmentWriter::create_file() const {
   silence_hdf5();
   const Hdf5Handle access = made(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   check(H5Pset_fapl_core(access.id(), kImageStepBytes, false));
+  // What the reader knows (hdf5_structure.h), whatever later versions do by themselves.
+  check(H5Pset_libver_bounds(access.id(), H5F_LIBVER_EARLIEST, H5F_LIBVER_LATEST));
   return made(H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.id()), H5Fclose);
 }
 
@@ -171,8 +174,9 @@ Hdf5SegmentWriter::Finished Hdf5SegmentWriter::finish() {
   return finished;
 }
 
-std::vector<std::uint8_t> Hdf5SegmentWriter::finish_whole() {
+std::vector<std::uint8_t> Hdf5SegmentWriter::finish_whole(std::size_t least_bytes) {
   std::vector<std::uint8_t> bytes = image();
+  bytes.resize(std::max(bytes.size(), least_bytes));
   append_seal(bytes, {});
   return bytes;
 }

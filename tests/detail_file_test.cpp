@@ -203,7 +203,7 @@ std::string error_of(const Forged& forged) {
                         H5T_NATIVE_UINT32, nullptr);
     file.write_chunk(0, pack_words(words, words.size(), 1));
   }
-  write_file_atomically(path, file.finish_whole());
+  write_file_atomically(path, file.finish_whole(0));
   const std::string error = error_of_reading(path);
   EXPECT_TRUE(error.empty() || error.find(path.string()) != std::string::npos) << error;
   return error;
@@ -255,7 +255,7 @@ TEST(DetailFile, NamesWhatElseAFileIs) {
   const TemporaryFolder folder;
   const fs::path path = folder.path() / "model.h5";
   const auto error_of_writing = [&](const SegmentIdentity& identity) {
-    write_file_atomically(path, Hdf5SegmentWriter(path, identity).finish_whole());
+    write_file_atomically(path, Hdf5SegmentWriter(path, identity).finish_whole(0));
     return error_of_reading(path);
   };
   SegmentIdentity identity = detail_identity();

@@ -158,7 +158,7 @@ TEST(Hdf5BorderDamage, RefusesSealedFilesThatAreNoSegments) {
   std::vector<std::uint8_t> text = {'n', 'o', ' ', 'H', 'D', 'F', '5'};
   append_seal(text, {});
   write_file_atomically(path, text);
-  EXPECT_THAT(error_of_opening(folder.path()), HasSubstr("HDF5 cannot open"));
+  EXPECT_THAT(error_of_opening(folder.path()), HasSubstr("it is no HDF5 file of the kind"));
 }
 
 // A file whose seal is right, whatever it says: only our own mistakes would make it.

@@ -263,21 +263,33 @@ TEST(Hdf5BorderStore, IsAnOrdinaryHdf5FileToOtherPrograms) {
   EXPECT_THAT(output_of("h5dump -a scheme " + path), HasSubstr("\"geodetic\""));
 }
 
+// Undoes the two filters itself, as the zstd plugin of HDF5 is in no package of Debian's.
+constexpr char kReadWithH5py[] = R"(
+import sys, h5py, numpy as np, zstandard
+borders = h5py.File(sys.argv[1])['borders']
+(records,), size = borders.chunks, borders.dtype.itemsize
+planes = [np.frombuffer(zstandard.decompress(borders.id.read_direct_chunk((row,))[1]), np.uint8)
+          for row in range(0, len(borders), records)]
+plain = b''.join(p.reshape(size, records).T.tobytes() for p in planes)
+masks = np.frombuffer(plain, borders.dtype)[:len(borders)]['mask']
+print(*np.unpackbits(masks, axis=-1, count=257, bitorder='little').sum(axis=1), end=' ')
+)";
+
 TEST(Hdf5BorderStore, H5pyReadsTheMasks) {
-  const std::string probe = output_of("python3 -c 'import h5py, hdf5plugin, numpy'");
-  if (!probe.empty()) GTEST_SKIP() << "needs python3 with h5py and hdf5plugin";
+  // A python3 from elsewhere has not what Debian's packages bring.
+  std::string python;
+  for (const std::string candidate : {"python3", "/usr/bin/python3"}) {
+    if (output_of(candidate + " -c 'import h5py, numpy, zstandard'").empty()) python = candidate;
+  }
+  if (python.empty()) GTEST_SKIP() << "needs python3-h5py and python3-zstandard";
   const TemporaryFolder folder;
   const BorderModel model = make_segment(folder.path(), 700);
   std::string expected;
   for (const auto& [n, mask] : model) expected += std::to_string(mask.count()) + " ";
-  const std::string script =
-      "import sys, h5py, hdf5plugin, numpy as np\n"
-      "b = h5py.File(sys.argv[1])['borders'][:]\n"
-      "m = np.unpackbits(b['mask'], axis=-1, count=257, bitorder='little')\n"
-      "print(*m.sum(axis=1), end=' ')\n";
-  EXPECT_EQ(
-      output_of("python3 -c \"" + script + "\" " + border_segment_path(folder.path(), 0).string()),
-      expected);
+  folder.put("read.py", kReadWithH5py);
+  EXPECT_EQ(output_of(python + " " + (folder.path() / "read.py").string() + " " +
+                      border_segment_path(folder.path(), 0).string()),
+            expected);
 }
 
 }  // namespace

@@ -217,7 +217,8 @@ TEST(Hdf5LatticeStore, RefusesSealedFilesThatAreNoSegments) {
   std::vector<std::uint8_t> text = {'n', 'o', ' ', 'H', 'D', 'F', '5'};
   append_seal(text, {});
   write_bytes(path, text);
-  EXPECT_THAT(error_of_opening(folder.path(), kGeodetic, kOptions), HasSubstr("HDF5 cannot open"));
+  EXPECT_THAT(error_of_opening(folder.path(), kGeodetic, kOptions),
+              HasSubstr("it is no HDF5 file of the kind"));
 }
 
 TEST(Hdf5LatticeStore, NamesASegmentThatIsMissing) {
