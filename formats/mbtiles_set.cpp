@@ -12,6 +12,7 @@
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
+#include "formats/mbtiles_schema.h"
 #include "formats/sqlite_file.h"
 
 namespace qmpipe {
@@ -39,9 +40,23 @@ struct Connection {
   SqliteStatement size;
 };
 
-Result<Connection> connect(const fs::path& path, SqliteAccess access) {
-  Result<SqliteFile> file = SqliteFile::open(path, access, kLimitBytes);
+struct Opening {
+  SqliteAccess access = SqliteAccess::kRead;
+  std::uint64_t file_bytes = 0;
+};
+
+// Listing a tile takes some thirty instructions and a row of at least eight bytes; a table without
+// an index is gone through for each tile.
+std::int64_t most_instructions(std::uint64_t file_bytes) {
+  constexpr std::uint64_t kAlways = 10'000'000;
+  return static_cast<std::int64_t>(kAlways + 8 * std::min(file_bytes, std::uint64_t{1} << 50U));
+}
+
+Result<Connection> connect(const fs::path& path, const Opening& opening) {
+  Result<SqliteFile> file = SqliteFile::open(path, opening.access, kLimitBytes);
   if (!file) return file.error();
+  file->limit_work(most_instructions(opening.file_bytes));
+  if (const auto error = fault_of_schema(*file)) return *error;
   Result<SqliteStatement> read = file->prepare(kReadSql);
   if (!read) return read.error();
   Result<SqliteStatement> size = file->prepare(kSizeSql);
@@ -139,7 +154,7 @@ Result<Listing> list_tiles(SqliteFile& file, RowOrder rows, std::uint64_t file_b
     const Result<bool> has_row = row->step();
     if (!has_row) return has_row.error();
     if (!*has_row) break;
-    // A view can make rows out of nothing, and go on for ever.
+    // Two tables that are joined can make far more rows than they have.
     if (count == file_bytes) return Error{"it lists more tiles than its bytes can hold"};
     if (const std::optional<TileKey> key = key_of(*row, rows)) {
       listing.keys.push_back(*key);
@@ -243,11 +258,6 @@ bool holds_changes(const fs::path& wal) {
   return !code && bytes > 0;
 }
 
-struct Opening {
-  SqliteAccess access = SqliteAccess::kRead;
-  std::uint64_t file_bytes = 0;
-};
-
 // How the file can be read without writing anything and without missing what stands beside it.
 Result<Opening> examine(const fs::path& path) {
   constexpr std::string_view kMagic("SQLite format 3\0", 16);
@@ -285,7 +295,7 @@ Result<std::unique_ptr<TileSet>> read_mbtiles(const fs::path& path, RowOrder row
   if (!opening) return opening.error();
   std::vector<Connection> connections;
   for (std::size_t k = 0; k < kConnections; ++k) {
-    Result<Connection> connection = connect(path, opening->access);
+    Result<Connection> connection = connect(path, *opening);
     if (!connection) return connection.error();
     connections.push_back(std::move(*connection));
   }

@@ -18,6 +18,9 @@ constexpr int kPatienceMs = 2000;
 // `code` may say more than the connection does, which is absent where there was no memory for it.
 Error error_of(sqlite3* connection, int code) {
   if (connection == nullptr) return Error{sqlite3_errstr(code)};
+  if ((code & 0xFF) == SQLITE_INTERRUPT) {
+    return Error{"it makes SQLite work for longer than its size explains"};
+  }
   const int system_error = sqlite3_system_errno(connection);
   if ((code & 0xFF) != SQLITE_CANTOPEN || system_error == 0) {
     return Error{sqlite3_errmsg(connection)};
@@ -85,7 +88,10 @@ Result<bool> SqliteStatement::step() {
   return error_of(sqlite3_db_handle(statement_.get()), code);
 }
 
-void SqliteStatement::reset() { sqlite3_reset(statement_.get()); }
+void SqliteStatement::reset() {
+  sqlite3_reset(statement_.get());
+  budget_->left = budget_->whole;
+}
 
 SqliteType SqliteStatement::type(int column) const {
   switch (sqlite3_column_type(statement_.get(), column)) {
@@ -145,7 +151,19 @@ Result<SqliteStatement> SqliteFile::prepare(const std::string& sql) {
   const int code = sqlite3_prepare_v3(connection_.get(), sql.c_str(), -1, SQLITE_PREPARE_PERSISTENT,
                                       &statement, nullptr);
   if (code != SQLITE_OK) return error_of(connection_.get(), code);
-  return SqliteStatement(statement);
+  budget_->left = budget_->whole;
+  return SqliteStatement(statement, budget_.get());
+}
+
+void SqliteFile::limit_work(std::int64_t instructions) {
+  constexpr int kBetween = 10000;
+  *budget_ = {.whole = instructions, .left = instructions};
+  const auto is_over = [](void* budget) {
+    std::int64_t& left = static_cast<SqliteBudget*>(budget)->left;
+    left -= kBetween;
+    return left < 0 ? 1 : 0;
+  };
+  sqlite3_progress_handler(connection_.get(), kBetween, is_over, budget_.get());
 }
 
 std::string SqliteFile::remedy() const {

@@ -2,7 +2,7 @@
 // file it reads may be anybody's.
 //
 // Guarantees: no damaged or hostile file crashes the program; its views and triggers can call
-// nothing that has effects. Error messages are SQLite's words, with the system's where it has any.
+// nothing that has effects, and with limit_work() not go on for ever. Error messages are SQLite's words, with the system's where it has any.
 // One connection (with its statements) is used by one thread at a time.
 #pragma once
 
@@ -26,10 +26,17 @@ enum class SqliteAccess { kRead, kReadFrozen, kWrite };
 
 enum class SqliteType { kInteger, kReal, kText, kBlob, kNull };
 
+// What a statement may still do, in SQLite's instructions.
+struct SqliteBudget {
+  std::int64_t whole = 0;
+  std::int64_t left = 0;
+};
+
 // Must not outlive its SqliteFile.
 class SqliteStatement {
  public:
-  explicit SqliteStatement(sqlite3_stmt* statement) : statement_(statement) {}
+  SqliteStatement(sqlite3_stmt* statement, SqliteBudget* budget)
+      : statement_(statement), budget_(budget) {}
 
   // Parameters and columns count from 1 and from 0, as SQLite's do. What `bytes` or `text` point to
   // must live until the next reset().
@@ -51,6 +58,7 @@ class SqliteStatement {
     void operator()(sqlite3_stmt* statement) const;
   };
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+  SqliteBudget* budget_;
 };
 
 class SqliteFile {
@@ -59,6 +67,9 @@ class SqliteFile {
   static Result<SqliteFile> open(const std::filesystem::path& path, SqliteAccess access,
                                  std::size_t limit_bytes);
 
+  // From now on a statement that needs more instructions from a prepare() or reset() on ends with an
+  // error; some ten thousand more may be done.
+  void limit_work(std::int64_t instructions);
   // One or more statements whose rows are of no interest; what failed, or nothing.
   std::optional<Error> execute(const std::string& sql);
   Result<SqliteStatement> prepare(const std::string& sql);
@@ -73,6 +84,7 @@ class SqliteFile {
   };
   explicit SqliteFile(sqlite3* connection) : connection_(connection) {}
 
+  std::unique_ptr<SqliteBudget> budget_ = std::make_unique<SqliteBudget>();
   std::unique_ptr<sqlite3, Close> connection_;
 };
 

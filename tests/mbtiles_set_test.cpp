@@ -1,17 +1,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <random>
 #include <thread>
 
 #include "formats/errors.h"
 #include "formats/mbtiles.h"
+#include "formats/mbtiles_schema.h"
 #include "formats/sqlite_file.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {
 namespace {
 
+using ::testing::AnyOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -127,11 +130,89 @@ TEST_F(MbtilesSetTest, WhatIsNoMbtilesFileIsRefused) {
   EXPECT_THAT(refusal(), HasSubstr("it is no SQLite file"));
 }
 
+// With rows or without any, which no count of rows would notice, and where there is no end to parsing.
 TEST_F(MbtilesSetTest, AViewThatNeverEndsIsRefused) {
+  const std::string endless = "WITH RECURSIVE n(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM n) ";
+  const std::string columns = "zoom_level, 1 AS tile_column, 0 AS tile_row, x'00' AS tile_data";
+  std::string doubled = "CREATE TABLE v0 (zoom_level, tile_column, tile_row, tile_data);";
+  for (int k = 0; k < 40; ++k) {
+    doubled += "CREATE VIEW v" + std::to_string(k + 1) + " AS SELECT * FROM v" + std::to_string(k) +
+               " UNION ALL SELECT * FROM v" + std::to_string(k) + ";";
+  }
+  for (const std::string& sql :
+       {"CREATE VIEW tiles AS " + endless + "SELECT i AS " + columns + " FROM n",
+        "CREATE VIEW tiles AS " + endless + "SELECT i AS " + columns + " FROM n WHERE i < 0",
+        "CREATE VIEW v AS " + endless + "SELECT i AS " + columns +
+            " FROM n WHERE i < 0; CREATE VIEW tiles AS SELECT * FROM v",
+        doubled + "CREATE VIEW tiles AS SELECT * FROM v40",
+        std::string("CREATE VIEW tiles AS SELECT value AS zoom_level, key AS tile_column, 0 AS "
+                    "tile_row, x'00' AS tile_data FROM json_each('[1,2]')"),
+        std::string("CREATE TABLE tiles (zoom_level, tile_column, tile_row, tile_data AS "
+                    "(hex(zeroblob(9999))))"),
+        std::string("CREATE VIRTUAL TABLE tiles USING fts5(zoom_level, tile_column, tile_row, "
+                    "tile_data)"),
+        std::string(kPlainTiles) + "DROP TABLE metadata; CREATE VIEW metadata AS " + endless +
+            "SELECT i AS name, i AS value FROM n WHERE i < 0"}) {
+    fs::remove(path());
+    run_sql(sql);
+    EXPECT_THAT(
+        refusal(),
+        AnyOf(HasSubstr("does more than pick columns"), HasSubstr("is no table of the file"),
+              HasSubstr("is no ordinary table"), HasSubstr("has computed columns")))
+        << sql;
+  }
+}
+
+// A join that any program could have written, of tables that multiply.
+TEST_F(MbtilesSetTest, AJoinThatMultipliesEndsSoon) {
   run_sql(
-      "CREATE VIEW tiles AS WITH RECURSIVE n(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM n)"
-      " SELECT 3 AS zoom_level, i AS tile_column, 0 AS tile_row, x'00' AS tile_data FROM n");
-  EXPECT_THAT(refusal(), HasSubstr("more tiles than its bytes can hold"));
+      "CREATE TABLE a (x, z); CREATE TABLE b (y, w, v); CREATE INDEX on_w ON b (w);"
+      "WITH n(i) AS (SELECT 5 UNION ALL SELECT i + 1 FROM n WHERE i < 20000)"
+      " INSERT INTO a SELECT i, 1 FROM n; INSERT INTO b SELECT x, 1, 1 FROM a;"
+      "CREATE VIEW tiles AS SELECT a.x AS zoom_level, a.x AS tile_column, b.y AS tile_row,"
+      " b.y AS tile_data FROM a JOIN b ON a.z = b.w AND a.x = b.v");
+  // Four hundred million pairs, none of which is a tile.
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_THAT(refusal(), HasSubstr("work for longer than its size explains"));
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+}
+
+TEST(MbtilesSchema, KnowsTheViewsThatProgramsWrite) {
+  const auto tables_in = [](const std::string& sql) {
+    const auto tables = tables_of_view(sql);
+    return tables ? *tables : std::vector<std::string>{};
+  };
+  // MBTiles 1.3, planetiler, others.
+  EXPECT_THAT(tables_in("CREATE VIEW tiles AS\n    SELECT\n        map.zoom_level AS zoom_level,\n"
+                        " map.tile_column AS tile_column, map.tile_row AS tile_row,\n"
+                        " images.tile_data AS tile_data\n FROM map\n"
+                        " JOIN images ON images.tile_id = map.tile_id;"),
+              ElementsAre("map", "images"));
+  EXPECT_THAT(tables_in("CREATE VIEW tiles AS select tiles_shallow.zoom_level as zoom_level, "
+                        "tiles_data.tile_data as tile_data from tiles_shallow join tiles_data on "
+                        "tiles_shallow.tile_data_id = tiles_data.tile_data_id"),
+              ElementsAre("tiles_shallow", "tiles_data"));
+  EXPECT_THAT(tables_in("CREATE VIEW \"tiles\" AS SELECT m.zoom_level, m.[tile_column], tile_row, "
+                        "`i`.tile_data FROM \"map\" AS m LEFT OUTER JOIN images i USING (tile_id)"),
+              ElementsAre("map", "images"));
+  EXPECT_THAT(tables_in("CREATE VIEW tiles(zoom_level, tile_data) AS SELECT * FROM map, images "
+                        "WHERE (map.tile_id == images.tile_id AND map.layer = images.layer)"),
+              ElementsAre("map", "images"));
+  EXPECT_THAT(tables_in("CREATE VIEW tiles AS SELECT z zoom_level, x AS tile_column FROM t"),
+              ElementsAre("t"));
+  for (const std::string sql :
+       {"CREATE VIEW tiles AS SELECT a FROM t JOIN u ON t.a = u.a JOIN v ON v.a = u.a",
+        "CREATE VIEW tiles AS SELECT f(a) FROM t", "CREATE VIEW tiles AS SELECT 1 FROM t",
+        "CREATE VIEW tiles AS SELECT a FROM t UNION SELECT a FROM t",
+        "CREATE VIEW tiles AS SELECT a FROM (SELECT a FROM t)",
+        "CREATE VIEW tiles AS SELECT (SELECT a FROM t) FROM t",
+        "CREATE VIEW tiles AS SELECT a FROM main.t", "CREATE VIEW tiles AS VALUES (1)",
+        "CREATE VIEW tiles AS SELECT a FROM generate_series(1)",
+        "CREATE VIEW tiles AS SELECT a FROM t WHERE a = 1",
+        "CREATE VIEW tiles AS SELECT \"a FROM t", "CREATE VIEW tiles AS SELECT a -- x\n FROM t",
+        ""}) {
+    EXPECT_THAT(tables_in(sql), IsEmpty()) << sql;
+  }
 }
 
 TEST_F(MbtilesSetTest, ChangesThatAreNotInTheFileYetAreNotPassedOver) {
