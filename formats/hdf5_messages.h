@@ -17,7 +17,7 @@
 namespace qmpipe {
 
 // The address of what is not there.
-inline constexpr std::uint64_t kNowhere = std::numeric_limits<std::uint64_t>::max();
+inline constexpr std::uint64_t kNoAddress = std::numeric_limits<std::uint64_t>::max();
 inline constexpr std::size_t kMostHdf5Dimensions = 4;
 
 // Numbers one after the other; past the end they are 0 and failed() says so.

@@ -291,7 +291,7 @@ Result<std::vector<LocatedChunk>> Hdf5Structure::chunks(const Hdf5Dataset& datas
                                                         std::size_t limit) const {
   QMPIPE_CHECK(dataset.is_chunked);
   std::vector<LocatedChunk> chunks;
-  if (dataset.chunk_index == kNowhere) return chunks;
+  if (dataset.chunk_index == kNoAddress) return chunks;
   if (const auto error =
           Parser(path_, end_)
               .read_chunks(dataset.chunk_index, -1, dataset.shape.size(), limit, chunks)) {
