@@ -38,7 +38,6 @@ THIRD_PARTY = [
     ("meshoptimizer", r"meshoptimizer", ["stages"]),
     ("CGAL", r"(CGAL|boost)/", ["stages"]),
     ("CLI11", r"CLI/", ["tools"]),
-    ("cpp-httplib", r"httplib", ["tools"]),
     ("libcurl", r"curl/", ["tools"]),
     ("spdlog/fmt", r"(spdlog|fmt)/", LAYERS),
     ("GoogleTest", r"(gtest|gmock)/", []),
@@ -48,7 +47,7 @@ THIRD_PARTY = [
 # C++ standard headers have no suffix and no folder.
 STANDARD = re.compile(r"[a-z0-9_]+$")
 # The operating system's, for .cpp files only.
-SYSTEM = re.compile(r"((sys|linux)/\w+|dirent|errno|fcntl|malloc|poll|pthread|sched|signal|termios|time"
+SYSTEM = re.compile(r"((sys|linux|netinet)/\w+|dirent|errno|fcntl|malloc|netdb|poll|pthread|sched|signal|termios|time"
                     r"|unistd)\.h$")
 INCLUDE = re.compile(r'\s*#\s*include\s*([<"])([^>"]+)[>"]')
 

@@ -5,42 +5,17 @@
 """
 
 import gzip
-import http.client
 import json
 import pathlib
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
 import unittest
 
+from running_server import Server
+
 QMPIPE = ""
-
-
-class Server:
-    """A running `qmpipe serve`, ended by its process id."""
-
-    def __init__(self, path):
-        self.process = subprocess.Popen([QMPIPE, "serve", str(path), "--port", "0", "--json"],
-                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        line = self.process.stdout.readline()
-        if not line:
-            raise RuntimeError(self.process.stderr.read())
-        self.said = json.loads(line)
-
-    def end(self):
-        self.process.send_signal(signal.SIGINT)
-        _, errors = self.process.communicate(timeout=60)
-        return self.process.returncode, errors
-
-    def get(self, path, **headers):
-        connection = http.client.HTTPConnection("127.0.0.1", self.said["port"], timeout=30)
-        connection.request("GET", path, headers={k.replace("_", "-"): v for k, v in headers.items()})
-        answer = connection.getresponse()
-        answer.body = answer.read()
-        connection.close()
-        return answer
 
 
 class ServeDetailTest(unittest.TestCase):
@@ -57,7 +32,7 @@ class ServeDetailTest(unittest.TestCase):
         info = subprocess.run([QMPIPE, "detail", "info", cls.model, "--json"], check=True,
                               capture_output=True)
         cls.info = json.loads(info.stdout)
-        cls.server = Server(cls.model)
+        cls.server = Server(QMPIPE, cls.model)
         cls.addClassCleanup(cls.server.process.kill)
 
     @classmethod
@@ -123,7 +98,7 @@ class ServeDetailTest(unittest.TestCase):
                 self.assertEqual((other.status, other.body), (200, first.body), path)
 
     def test_the_same_model_is_served_as_the_same_bytes(self):
-        server = Server(self.model)
+        server = Server(QMPIPE, self.model)
         try:
             for path in ("/model.json", "/block/3.bin", "/seams.bin"):
                 mine, its = (s.get(path, Accept_Encoding="gzip") for s in (self.server, server))

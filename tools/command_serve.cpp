@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
@@ -105,6 +106,8 @@ std::string greeting(const ServeArguments& arguments, const DetailService& servi
 template <class Service>
 int serve(const ServeArguments& arguments, const Service& service, const char* start_page) {
   const PageFiles pages(find_page_folder());
+  // From before anybody can know of the server.
+  const std::atomic<bool>& stop = *stop_flag_of_signals();
   HttpServer server(arguments.listen, [&](HttpRequest request) {
     if (request.path == "/") request.path = start_page;
     std::optional<HttpReply> reply = service.answer(request);
@@ -113,7 +116,7 @@ int serve(const ServeArguments& arguments, const Service& service, const char* s
   const std::string text = greeting(arguments, service, pages, server.port());
   std::fputs(text.c_str(), stdout);
   std::fflush(stdout);
-  server.run(*stop_flag_of_signals());
+  server.run(stop);
   return 0;
 }
 

@@ -3,7 +3,6 @@
 
 #include <atomic>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 
@@ -17,9 +16,11 @@ struct ListenOptions {
   int threads = 64;  // as many connections are served at a time; others wait
 };
 
-// Answers GET and HEAD through a handler that may be called from any thread; OPTIONS, other methods,
-// malformed requests and addresses that the handler does not know are answered here, with 4xx and an
-// {"error"} where something is wrong. Every answer allows any origin.
+// Answers GET and HEAD through a handler that may be called from any thread, and one range of what it
+// gives; OPTIONS, other methods, malformed requests and addresses that the handler does not know are
+// answered here, with 4xx and an {"error"} where something is wrong. Every answer allows any origin.
+// A request is a head (tools/request_head.h has its limits) that comes within seconds; bodies are not
+// read.
 class HttpServer {
  public:
   using Handler = std::function<std::optional<HttpReply>(const HttpRequest&)>;
@@ -32,12 +33,13 @@ class HttpServer {
   HttpServer& operator=(const HttpServer&) = delete;
 
   int port() const { return port_; }
-  // Serves until `stop` is true.
+  // Serves until `stop` is true, and ends within 2 s of it, whatever clients do.
   void run(const std::atomic<bool>& stop);
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  Handler handler_;
+  int threads_ = 1;
+  int socket_ = -1;
   int port_ = 0;
 };
 
