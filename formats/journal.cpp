@@ -2,15 +2,12 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <optional>
-#include <system_error>
 
-#include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/hash64.h"
 #include "scheduler/check.h"
@@ -98,13 +95,7 @@ Result<std::unique_ptr<Journal>> Journal::open(const std::filesystem::path& path
   const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (descriptor < 0) throw_io_error("cannot open the journal", path, errno);
   std::unique_ptr<Journal> journal(new Journal(path, descriptor));
-  // Goes with the process, however it ends.
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
-    throw IoError("cannot use the journal", path.string(),
-                  errno == EWOULDBLOCK ? "another run is at work with it"
-                                       : std::generic_category().message(errno),
-                  "Wait for that run, or stop it.");
-  }
+  journal->lock_file_ = lock_open_file(descriptor, path);
   const Result<std::vector<std::uint8_t>> bytes = read_file_bytes(path, kMostBytes);
   if (!bytes) return bytes.error();
   Result<JournalContent> content = parse_journal(*bytes);
@@ -116,6 +107,13 @@ Result<std::unique_ptr<Journal>> Journal::open(const std::filesystem::path& path
   }
   sync_folder_of(path);
   return journal;
+}
+
+void Journal::clear() {
+  if (::ftruncate(descriptor_, 0) != 0 || ::fdatasync(descriptor_) != 0) {
+    throw_io_error("cannot write the journal", path_, errno);
+  }
+  content_ = {.lines = {}, .sound_bytes = 0, .last_hash = kSeed};
 }
 
 void Journal::append(const std::string& text) {

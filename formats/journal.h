@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/file_lock.h"
 #include "formats/result.h"
 
 namespace qmpipe {
@@ -42,12 +43,15 @@ class Journal {
   const std::vector<std::string>& lines() const { return content_.lines; }
   // REQUIRES: no newline in `text`. Throws IoError; then the file holds what it held before.
   void append(const std::string& text);
+  // Begins anew, as if it had just been made. Throws IoError.
+  void clear();
 
  private:
   Journal(std::filesystem::path path, int descriptor);
 
   const std::filesystem::path path_;
   const int descriptor_;
+  std::unique_ptr<LockFile> lock_file_;  // where there are no better locks
   JournalContent content_;
 };
 

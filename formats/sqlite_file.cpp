@@ -1,7 +1,9 @@
 #include "formats/sqlite_file.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <system_error>
@@ -29,8 +31,10 @@ Error error_of(sqlite3* connection, int code) {
                            std::generic_category().message(system_error))};
 }
 
-// As a URI, so that `immutable` can be said; every character that means something there is escaped.
-std::string uri_of(const std::filesystem::path& path, SqliteAccess access) {
+enum class Locks { kSystem, kNone };
+
+// As a URI, so that options can be said; every character that means something there is escaped.
+std::string uri_of(const std::filesystem::path& path, SqliteAccess access, Locks locks) {
   std::string uri = "file:";
   for (const char c : std::filesystem::absolute(path).string()) {
     const auto byte = static_cast<unsigned char>(c);
@@ -39,7 +43,29 @@ std::string uri_of(const std::filesystem::path& path, SqliteAccess access) {
                           c == '_';
     uri += is_plain ? std::string(1, c) : fmt::format("%{:02X}", byte);
   }
-  return access == SqliteAccess::kReadFrozen ? uri + "?immutable=1" : uri;
+  if (access == SqliteAccess::kReadFrozen) return uri + "?immutable=1";
+  return locks == Locks::kNone ? uri + "?nolock=1" : uri;
+}
+
+// Whether the file system answers that it has no locks. SQLite calls that a disk error, or a busy file.
+bool lacks_locks(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor < 0) return false;
+  struct flock lock {};
+  lock.l_type = F_RDLCK;
+  lock.l_whence = SEEK_SET;
+  const bool lacks = ::fcntl(descriptor, F_SETLK, &lock) != 0 && means_no_locks(errno);
+  ::close(descriptor);
+  return lacks;
+}
+
+// Asks for a lock as any use of the file does. A file that is none of SQLite's is refused later.
+bool can_be_locked(sqlite3* connection, const std::filesystem::path& path) {
+  const int code =
+      sqlite3_exec(connection, "PRAGMA schema_version", nullptr, nullptr, nullptr) & 0xFF;
+  const bool may_lack = code == SQLITE_IOERR || code == SQLITE_BUSY;
+  // Closing a descriptor gives back the process's locks, of which there are none where this one failed.
+  return !may_lack || !lacks_locks(path);
 }
 
 std::optional<Error> harden(sqlite3* connection, std::size_t limit_bytes) {
@@ -130,14 +156,25 @@ Result<SqliteFile> SqliteFile::open(const std::filesystem::path& path, SqliteAcc
   const int flags = (access == SqliteAccess::kWrite ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE
                                                     : SQLITE_OPEN_READONLY) |
                     SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX;
-  sqlite3* connection = nullptr;
-  const int code = sqlite3_open_v2(uri_of(path, access).c_str(), &connection, flags, nullptr);
-  // There is a connection to close even where it could not be opened.
-  SqliteFile file(connection);
-  if (code != SQLITE_OK) return error_of(connection, code);
-  if (auto error = harden(connection, limit_bytes)) return *error;
-  if (access != SqliteAccess::kWrite) sqlite3_busy_timeout(connection, kPatienceMs);
-  return file;
+  std::unique_ptr<LockFile> lock_file;
+  for (const Locks locks : {Locks::kSystem, Locks::kNone}) {
+    sqlite3* connection = nullptr;
+    const int code =
+        sqlite3_open_v2(uri_of(path, access, locks).c_str(), &connection, flags, nullptr);
+    // There is a connection to close even where it could not be opened.
+    SqliteFile file(connection);
+    if (code != SQLITE_OK) return error_of(connection, code);
+    if (auto error = harden(connection, limit_bytes)) return *error;
+    const bool is_last = locks == Locks::kNone || access == SqliteAccess::kReadFrozen;
+    if (is_last || can_be_locked(connection, path)) {
+      if (access != SqliteAccess::kWrite) sqlite3_busy_timeout(connection, kPatienceMs);
+      file.lock_file_ = std::move(lock_file);
+      return file;
+    }
+    // Nobody writes what is only read here: a file takes its name when it is whole.
+    if (access == SqliteAccess::kWrite) lock_file = LockFile::make(path);
+  }
+  return Error{"it cannot be locked"};
 }
 
 std::optional<Error> SqliteFile::execute(const std::string& sql) {

@@ -14,6 +14,7 @@
 #include <string>
 #include <string_view>
 
+#include "formats/file_lock.h"
 #include "formats/result.h"
 
 struct sqlite3;
@@ -63,7 +64,9 @@ class SqliteStatement {
 
 class SqliteFile {
  public:
-  // kWrite makes the file when it is absent. No blob or text longer than `limit_bytes` is read.
+  // kWrite makes the file when it is absent. No blob or text longer than `limit_bytes` is read. Where
+  // the file system has no locks, kWrite takes a lock file (formats/file_lock.h), and throws its
+  // IoError when another process has it.
   static Result<SqliteFile> open(const std::filesystem::path& path, SqliteAccess access,
                                  std::size_t limit_bytes);
 
@@ -85,6 +88,7 @@ class SqliteFile {
   explicit SqliteFile(sqlite3* connection) : connection_(connection) {}
 
   std::unique_ptr<SqliteBudget> budget_ = std::make_unique<SqliteBudget>();
+  std::unique_ptr<LockFile> lock_file_;  // outlives the connection
   std::unique_ptr<sqlite3, Close> connection_;
 };
 

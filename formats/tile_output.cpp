@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <string>
+#include <system_error>
 
 #include "formats/errors.h"
+#include "formats/file_bytes.h"
 #include "formats/folder_sink.h"
 #include "formats/mbtiles.h"
 
@@ -54,6 +56,18 @@ std::unique_ptr<TileSink> resume_tile_sink(const std::filesystem::path& output) 
       break;
   }
   refuse_pmtiles(output);
+}
+
+bool may_hold_tiles(const std::filesystem::path& output) {
+  const bool is_folder = form_of(output) == TileForm::kFolder;
+  std::error_code code;
+  const std::filesystem::path place =
+      is_folder ? output : std::filesystem::path(output.string() + kTemporarySuffix);
+  const bool is_there = std::filesystem::exists(place, code);
+  if (code || !is_there) return static_cast<bool>(code);
+  if (!is_folder) return true;
+  const bool is_empty = std::filesystem::is_empty(place, code);
+  return code || !is_empty;
 }
 
 std::filesystem::path report_path(const std::filesystem::path& output) {

@@ -21,6 +21,10 @@ std::unique_ptr<TileSink> open_tile_sink(const std::filesystem::path& output, Ov
 // Goes on with what an earlier run left unfinished, in either form.
 std::unique_ptr<TileSink> resume_tile_sink(const std::filesystem::path& output);
 
+// False when the output is absent, or an empty folder, or has no working file: a run that failed has
+// left nothing that stands in the way of another. True when that cannot be told.
+bool may_hold_tiles(const std::filesystem::path& output);
+
 // Where a build's report goes: report.json in the folder, OUT.mbtiles.report.json beside a file.
 std::filesystem::path report_path(const std::filesystem::path& output);
 

@@ -152,10 +152,12 @@ RunPlace open_place(const BuildOptions& options, Progress& progress) {
 // Opened before hours of work, so that an output that cannot be used is known at once.
 std::unique_ptr<TileSink> open_sink(const BuildOptions& options, const RunPlace& place) {
   if (options.run.dry_run) return nullptr;
-  if (place.record != nullptr && place.record->resumes()) {
-    return resume_tile_sink(options.output.path);
-  }
-  return open_tile_sink(options.output.path, options.output.overwrite);
+  const bool resumes = place.record != nullptr && place.record->resumes();
+  std::unique_ptr<TileSink> sink =
+      resumes ? resume_tile_sink(options.output.path)
+              : open_tile_sink(options.output.path, options.output.overwrite);
+  if (place.record != nullptr) place.record->begin_output(options.output.path);
+  return sink;
 }
 
 MemoryRequest memory_request(const BuildOptions& options) {
@@ -236,11 +238,30 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
   result.report.source_reads = survey.source_reads;
   result.report.survey_s = survey.seconds;
   result.report.peak_resident_bytes = peak_resident_bytes();
+  const LayerJson layer = layer_for(options, survey, plan, result.report);
+  result.report.built_from = provenance_of(options);
+  result.report.layer_version = layer.version;
   const std::string text = write_report(result.report);
   write_file_atomically(report_path(options.output.path),
                         {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
-  sink->close(write_layer_json(layer_for(options, survey, plan, result.report)));
+  sink->close(write_layer_json(layer));
   return result;
+}
+
+// A finished set of the same inputs and parameters is what was asked for; another one is refused here,
+// where it can be said what differs. An unfinished run goes first.
+std::optional<FinishedSet> found_set(const BuildOptions& options) {
+  if (options.run.dry_run || options.output.overwrite == Overwrite::kYes) return std::nullopt;
+  if (RunRecord::is_unfinished(run_folder(options))) return std::nullopt;
+  std::optional<FinishedSet> set = finished_set(options);
+  if (!set || set->differences.empty()) return set;
+  std::string text;
+  for (const std::string& difference : set->differences) {
+    text += (text.empty() ? "" : "; ") + difference;
+  }
+  throw IoError("cannot start a tile set in", options.output.path.string(),
+                "it holds a finished one, and " + text,
+                "Choose another output, or pass --overwrite to replace that tile set.");
 }
 
 }  // namespace
@@ -251,6 +272,11 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
                                     static_cast<std::size_t>(options.run.threads));
   SurveyOptions to_survey = survey_options(options);
   const std::vector<RasterInfo> sources = describe_inputs(to_survey);
+  if (auto set = found_set(options)) {
+    BuildResult result;
+    result.found = std::move(set);
+    return result;
+  }
   note_assumptions(sources, progress);
   // Refuses what cannot work before anything is made on disk.
   share_memory(memory_request(options), to_survey, sources);

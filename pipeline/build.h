@@ -2,6 +2,7 @@
 //
 // Guarantees: the tiles and layer.json depend on the inputs and the recipe alone, not on threads,
 // memory or interruptions. layer.json is written last: a folder without it is no finished tile set.
+// An output that is what the options ask for is left as it is, unless they say to overwrite it.
 // A run that was stopped, killed or failed is gone on with by the next one with the same inputs and
 // parameters (pipeline/run_record.h).
 // Throws UsageError (options), IoError (files), Interrupted (asked to stop), InternalError (a bug).
@@ -9,6 +10,7 @@
 
 #include "pipeline/build_options.h"
 #include "pipeline/estimate.h"
+#include "pipeline/finished_set.h"
 #include "pipeline/progress.h"
 #include "pipeline/report.h"
 
@@ -17,8 +19,10 @@ namespace qmpipe {
 struct BuildResult {
   Recipe recipe;
   Estimate estimate;
-  // Empty after a dry run.
+  // Empty after a dry run, and when the set was there already.
   BuildReport report;
+  // The output was what the options ask for, and nothing was done.
+  std::optional<FinishedSet> found;
 };
 
 BuildResult build_pyramid(const BuildOptions& options, Progress& progress);

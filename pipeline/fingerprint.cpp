@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "formats/hash64.h"
 #include "formats/raster_files.h"
 #include "pipeline/version.h"
 
@@ -96,7 +97,59 @@ void compare_inputs(const json& earlier, const json& now, std::vector<std::strin
   }
 }
 
+// What layer.json says of the set besides.
+json texts_of(const OutputOptions& output) {
+  return {{"--name", output.name},
+          {"--description", output.description},
+          {"--attribution", output.attribution}};
+}
+
+std::string hash_text(const std::string& text) {
+  return fmt::format("{:016x}",
+                     hash64({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, 0));
+}
+
+void compare_versions(const json& was, const json& is, std::vector<std::string>& differences) {
+  if (was.at("program_version") == is.at("program_version")) return;
+  differences.push_back(fmt::format("it was begun by version {} of the program, and this is {}",
+                                    was.at("program_version").dump(),
+                                    is.at("program_version").dump()));
+}
+
+void compare_values(const json& was, const json& is, std::vector<std::string>& differences) {
+  compare_members(was, is,
+                  [&differences](const std::string& name, const json& before, const json& after) {
+                    differences.push_back(
+                        fmt::format("{} was {}, and is {} now", name, before.dump(), after.dump()));
+                  });
+}
+
 }  // namespace
+
+std::string provenance_of(const BuildOptions& options) {
+  const json provenance = {{"program_version", kProgramVersion},
+                           {"inputs_hash", hash_text(inputs_of(options.input).dump())},
+                           {"parameters", parameters_of(options)},
+                           {"texts", texts_of(options.output)}};
+  return provenance.dump();
+}
+
+std::vector<std::string> provenance_differences(const std::string& earlier,
+                                                const std::string& now) try {
+  if (earlier == now) return {};
+  const json was = json::parse(earlier);
+  const json is = json::parse(now);
+  std::vector<std::string> differences;
+  compare_versions(was, is, differences);
+  if (was.at("inputs_hash") != is.at("inputs_hash")) {
+    differences.emplace_back("the inputs were others, or have changed (their sizes or times)");
+  }
+  compare_values(was.at("parameters"), is.at("parameters"), differences);
+  compare_values(was.at("texts"), is.at("texts"), differences);
+  return differences;
+} catch (const json::exception&) {
+  return {"its report was written by another program"};
+}
 
 std::string fingerprint_of(const BuildOptions& options) {
   const json fingerprint = {{"program_version", kProgramVersion},
@@ -111,17 +164,9 @@ std::vector<std::string> fingerprint_differences(const std::string& earlier,
   const json was = json::parse(earlier);
   const json is = json::parse(now);
   std::vector<std::string> differences;
-  if (was.at("program_version") != is.at("program_version")) {
-    differences.push_back(fmt::format("it was begun by version {} of the program, and this is {}",
-                                      was.at("program_version").dump(),
-                                      is.at("program_version").dump()));
-  }
+  compare_versions(was, is, differences);
   compare_inputs(was.at("inputs"), is.at("inputs"), differences);
-  compare_members(was.at("parameters"), is.at("parameters"),
-                  [&differences](const std::string& name, const json& before, const json& after) {
-                    differences.push_back(
-                        fmt::format("{} was {}, and is {} now", name, before.dump(), after.dump()));
-                  });
+  compare_values(was.at("parameters"), is.at("parameters"), differences);
   return differences;
 } catch (const json::exception&) {
   return {"the journal was written by another program"};

@@ -21,4 +21,9 @@ std::string fingerprint_of(const BuildOptions& options);
 std::vector<std::string> fingerprint_differences(const std::string& earlier,
                                                  const std::string& now);
 
+// What decides a finished set's bytes, layer.json included, for its report: the same, but the inputs are a
+// hash, since the report may be served with the tiles, and with the texts of layer.json.
+std::string provenance_of(const BuildOptions& options);
+std::vector<std::string> provenance_differences(const std::string& earlier, const std::string& now);
+
 }  // namespace qmpipe

@@ -70,6 +70,10 @@ std::string write_report(const BuildReport& report) {
                       {"decoded_blocks", report.source_reads.decoded_blocks},
                       {"decoded_per_block", report.source_reads.decoded_per_block()},
                       {"decoded_bytes", report.source_reads.decoded_bytes}};
+  if (!report.built_from.empty()) {
+    object["built_from"] = nlohmann::ordered_json::parse(report.built_from);
+    object["layer_version"] = report.layer_version;
+  }
   object["zooms"] = nlohmann::ordered_json::array();
   for (const BuiltZoom& zoom : report.zooms) object["zooms"].push_back(zoom_object(zoom));
   return object.dump(2) + "\n";

@@ -44,6 +44,8 @@ struct BuildReport {
   std::int32_t max_in_flight = 0;
   std::int64_t expected_peak_bytes = 0;
   std::int64_t peak_resident_bytes = 0;
+  std::string built_from;     // JSON: pipeline/fingerprint.h, provenance_of()
+  std::string layer_version;  // of the layer.json that it belongs to
 
   void add(const TileWork& work);
 };

@@ -12,6 +12,7 @@
 #include "formats/hdf5_border_store.h"
 #include "formats/hdf5_lattice_store.h"
 #include "formats/segment_files.h"
+#include "formats/tile_output.h"
 #include "pipeline/fingerprint.h"
 
 namespace qmpipe {
@@ -21,6 +22,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr const char* kJournalName = "journal";
+constexpr std::size_t kMostJournalBytes = std::size_t{1} << 30U;
 
 void make_run_folder(const fs::path& folder) {
   make_folders(folder);
@@ -77,7 +79,7 @@ RunRecord::RunRecord(fs::path folder, std::unique_ptr<Journal> journal)
 
 RunRecord::~RunRecord() {
   try {
-    if (!is_kept_ && !is_worth_keeping()) remove_own_files(folder_);
+    if (!is_kept_ && !is_worth_keeping() && !has_begun_output()) remove_folder();
   } catch (const std::exception&) {
     // The folder cannot even be listed: left as it is.
   }
@@ -107,12 +109,22 @@ std::unique_ptr<RunRecord> RunRecord::open(const fs::path& folder, const std::st
   return record;
 }
 
+// While the journal is there, and held, nobody else begins.
+void RunRecord::remove_folder() {
+  remove_own_files(folder_);
+  journal_.reset();
+  // A lock file may have stood there until now.
+  remove_folder_if_empty(folder_);
+}
+
 void RunRecord::refuse(const std::string& cause) const { refuse_run(folder_, cause); }
 
 void RunRecord::read_lines(const std::string& fingerprint) {
   const std::vector<std::string>& lines = journal_->lines();
-  resumes_ = !lines.empty();
+  // The first line alone promises nothing, and whose the output is was not known yet.
+  resumes_ = lines.size() > 1;
   if (!resumes_) {
+    journal_->clear();
     journal_->append(fingerprint);
     return;
   }
@@ -131,7 +143,9 @@ void RunRecord::read_lines(const std::string& fingerprint) {
 bool RunRecord::read_line(const std::string& line) try {
   const json object = json::parse(line);
   is_clearing_ = false;
-  if (object.contains("surveyed_zoom")) {
+  if (object.contains("output_begun")) {
+    is_output_ours_ = true;
+  } else if (object.contains("surveyed_zoom")) {
     surveyed_[object.at("surveyed_zoom").get<std::int32_t>()] =
         object.at("lattice_segments").get<std::int32_t>();
   } else if (object.contains("plan")) {
@@ -171,6 +185,28 @@ bool RunRecord::is_worth_keeping() const {
   return !surveyed_.empty() || tiles_.tiles_done > 0 || count_lattice_segments(folder_) > 0;
 }
 
+// Whether tiles stand in the output that no checkpoint counts. Without the journal they would look like
+// somebody else's.
+bool RunRecord::has_begun_output() const {
+  if (!is_output_ours_) return false;
+  return output_.empty() || may_hold_tiles(output_);
+}
+
+bool RunRecord::is_unfinished(const fs::path& folder) {
+  const auto bytes = read_file_bytes(folder / kJournalName, kMostJournalBytes);
+  if (!bytes) return fs::exists(folder / kJournalName);
+  const auto content = parse_journal(*bytes);
+  if (!content) return true;
+  return content->lines.empty() || !json::accept(content->lines.back()) ||
+         !json::parse(content->lines.back()).contains("finished");
+}
+
+void RunRecord::begin_output(const fs::path& output) {
+  output_ = output;
+  if (!is_output_ours_) journal_->append(json{{"output_begun", true}}.dump());
+  is_output_ours_ = true;
+}
+
 std::optional<std::int32_t> RunRecord::coarsest_surveyed() const {
   if (surveyed_.empty()) return std::nullopt;
   return surveyed_.begin()->first;
@@ -208,14 +244,14 @@ void RunRecord::add_tiles(const TileCheckpoint& checkpoint) {
 }
 
 void RunRecord::finish(bool keep) {
-  is_kept_ = keep;
   if (keep) {
     journal_->append(json{{"finished", true}}.dump());
+    is_kept_ = true;
     return;
   }
   // First of all: a crash must not leave a journal that counts on what is gone.
   journal_->append(json{{"stores_removed", true}}.dump());
-  remove_own_files(folder_);
+  remove_folder();
 }
 
 }  // namespace qmpipe

@@ -351,6 +351,29 @@ class Cli(unittest.TestCase):
         self.assertRegex(stderr, r"stopped after \d+ of \d+ tiles")
         self.assertFalse((out / "layer.json").exists())
 
+    def test_a_finished_build_given_again_says_so_and_does_nothing(self):
+        for name in ("again", "again.mbtiles"):
+            out = self.root / name
+            build = ("build", self.dem, "-o", out, "--max-zoom", 5)
+            self.assertEqual(run(*build).returncode, 0)
+            report = (out if out.is_dir() else self.root) / (
+                "report.json" if out.is_dir() else name + ".report.json")
+            before = report.read_bytes()
+            done = run(*build, "--threads", 1)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertRegex(done.stdout, r"^built already: \d+ tiles in ")
+            self.assertEqual(run(*build, "--json").stdout.encode(), before)
+            self.assertEqual(report.read_bytes(), before)
+            self.fails(1, *build, "--tolerance", 9000, "--attribution", "me",
+                       says=['g_e (--tolerance) was "15000/2", and is "9000/2" now',
+                             '--attribution was "", and is "me" now', "--overwrite"])
+            self.assertEqual(run(*build, "--overwrite").stdout.count("built already"), 0)
+            self.assertNotIn(str(self.root), report.read_text(), "the report may be served")
+        tile = next((self.root / "again").glob("5/*/*.terrain"))
+        tile.unlink()
+        self.fails(1, "build", self.dem, "-o", self.root / "again", "--max-zoom", 5,
+                   says=["tiles are there of the", "--overwrite"])
+
     def test_pack_convert_and_unpack_give_the_same_set_back(self):
         packed = self.root / "turn.mbtiles"
         archive = self.root / "turn.pmtiles"

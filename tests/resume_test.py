@@ -319,8 +319,9 @@ class StoppedRuns(ResumeTest):
         self.assertTrue(list(run_folder(out).glob("lattice-*.h5")))
         self.assertTrue(list(run_folder(out).glob("borders-*.h5")))
         done = self.build(out)
-        self.assertEqual(done.returncode, 1, done.stderr)
-        self.assertIn("is finished", done.stderr)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("built already", done.stdout)
+        self.refused(out, "--gzip", "2", says=["--gzip was 1, and is 2 now"])
         self.finish(out, "--overwrite")
 
     def test_the_run_folder_may_stand_elsewhere(self):

@@ -85,7 +85,14 @@ int run_build(const BuildArguments& arguments) {
   Progress progress(style, stop_flag_of_signals());
   const BuildResult result = build_pyramid(options, progress);
   std::string text;
-  if (options.run.dry_run) {
+  if (result.found) {
+    text = arguments.json
+               ? result.found->report_json
+               : fmt::format(
+                     "built already: {} tiles in {}, from the same inputs and parameters "
+                     "(--overwrite builds them again)\n",
+                     result.found->tiles, options.output.path.string());
+  } else if (options.run.dry_run) {
     text = arguments.json ? estimate_json(result.estimate) + "\n" : estimate_text(result.estimate);
   } else if (arguments.json) {
     text = write_report(result.report);
@@ -154,7 +161,7 @@ void register_build(CLI::App& app, std::function<int()>& action) {
       "  qmpipe build dem.tif -o alps.mbtiles\n"
       "  qmpipe build fine.tif coarse.tif -o tiles --max-zoom 12 --tolerance-at 12=2 --memory 2G\n"
       "A run that was stopped, killed or failed goes on where it was: give the same command "
-      "again.\n"
+      "again.\nGiven again when all is done, it says so and ends with 0.\n"
       "Exit codes: 0 built, 1 failed, 2 wrong usage, 130 interrupted (checkpoint kept).");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_build(*arguments); }; });
