@@ -241,7 +241,7 @@ class Cli(unittest.TestCase):
         self.assertEqual(list(self.root.glob("dry*")), [])
 
     def test_existing_output_is_refused_with_the_remedy(self):
-        self.fails(1, "build", self.dem, "-o", self.tiles, says=["--overwrite"])
+        self.fails(1, "build", self.dem, "-o", self.tiles, "--max-zoom", 3, says=["--overwrite"])
         file = self.root / "there.mbtiles"
         file.write_text("mine")
         self.fails(1, "build", self.dem, "-o", file, says=["--overwrite"])
