@@ -276,7 +276,7 @@ TEST_P(Hdf5Hostile, TrustsNoByteBehindTheSeal) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Readers, Hdf5Hostile, ::testing::ValuesIn(kinds()),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& test_case) { return test_case.param.name; });
 
 TEST(FileSeal, RefusesPartsThatOverlapOrAreOutOfOrder) {
   const TemporaryFolder folder;
