@@ -40,6 +40,13 @@ struct Strip {
   }
 };
 
+// A raster in hand. One that a pool has opened to be read does not know its own place on the globe,
+// nor whether it goes round it: its grid does.
+struct GridPixels {
+  const GridInfo& grid;
+  const RasterSource& source;
+};
+
 bool is_full(const Strip& block) {
   const auto width = static_cast<std::size_t>(block.posts.width_posts);
   const auto height = static_cast<std::size_t>(block.posts.height_posts);
@@ -67,8 +74,8 @@ struct Sampler::Impl {
 
   void sample_strip(const Lattice& lattice, const Strip& strip);
   void sample_block(std::size_t number, const Lattice& lattice, const Strip& block);
-  void sample_part(const RasterSource& source, const Strip& block, const Part& part);
-  void fetch(const RasterSource& source, const PixelWindow& needed);
+  void sample_part(const GridPixels& raster, const Strip& block, const Part& part);
+  void fetch(const GridPixels& raster, const PixelWindow& needed);
   void read_piece(const RasterSource& source, const PixelWindow& piece, double* out,
                   std::int64_t stride);
   float pole_height_m(const Lattice& lattice, std::int64_t j);
@@ -88,8 +95,8 @@ void Sampler::Impl::read_piece(const RasterSource& source, const PixelWindow& pi
 }
 
 // The needed window as if the raster went on beyond its edges.
-void Sampler::Impl::fetch(const RasterSource& source, const PixelWindow& needed) {
-  const RasterInfo& info = source.info();
+void Sampler::Impl::fetch(const GridPixels& raster, const PixelWindow& needed) {
+  const GridInfo& info = raster.grid;
   pixels.resize(needed.size());
   const std::int64_t row0 = std::clamp<std::int64_t>(needed.row0, 0, info.height - 1);
   const std::int64_t row1 =
@@ -108,7 +115,7 @@ void Sampler::Impl::fetch(const RasterSource& source, const PixelWindow& needed)
       // Outside the raster: its outermost pixel, one column at a time.
       piece.width = wanted == piece.column0 ? std::min(left, info.width - wanted) : 1;
     }
-    read_piece(source, piece, first + done, needed.width);
+    read_piece(raster.source, piece, first + done, needed.width);
     done += piece.width;
   }
   const auto row_at = [&](std::int64_t row) {
@@ -122,8 +129,8 @@ void Sampler::Impl::fetch(const RasterSource& source, const PixelWindow& needed)
   }
 }
 
-void Sampler::Impl::sample_part(const RasterSource& source, const Strip& block, const Part& part) {
-  const RasterInfo& info = source.info();
+void Sampler::Impl::sample_part(const GridPixels& raster, const Strip& block, const Part& part) {
+  const GridInfo& info = raster.grid;
   const RasterShape shape{
       .width = info.width, .height = info.height, .wraps_columns = info.wraps_columns};
   const auto places_of_row = [&](std::size_t r) {
@@ -148,11 +155,11 @@ void Sampler::Impl::sample_part(const RasterSource& source, const Strip& block, 
       second.row += first.height;
       second.height -= first.height;
     }
-    sample_part(source, block, first);
-    sample_part(source, block, second);
+    sample_part(raster, block, first);
+    sample_part(raster, block, second);
     return;
   }
-  fetch(source, needed->window);
+  fetch(raster, needed->window);
   for (std::size_t r = 0; r < part.height; ++r) {
     resample(resampling, shape, {.needed = *needed, .heights_m = pixels}, places_of_row(r),
              block.row(part.row + r, part.column, part.width));
@@ -172,7 +179,8 @@ void Sampler::Impl::sample_block(std::size_t number, const Lattice& lattice, con
         places[r * width + k].column = std::numeric_limits<double>::quiet_NaN();
     }
   }
-  sample_part(sources.source(number), block, {.width = width, .height = height});
+  sample_part({.grid = sources.info(number), .source = sources.source(number)}, block,
+              {.width = width, .height = height});
 }
 
 void Sampler::Impl::sample_strip(const Lattice& lattice, const Strip& strip) {
