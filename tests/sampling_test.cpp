@@ -297,6 +297,31 @@ TEST(Sampling, GlobalGridsInterpolateAcrossTheirSeam) {
   EXPECT_FLOAT_EQ(heights[4], heights[0]);
 }
 
+// The pixels on the two sides of the seam differ: one that is repeated beyond it would show.
+TEST(Sampling, GlobalGridsTakeTheFirstPixelAfterTheLast) {
+  const TemporaryFolder folder;
+  RasterFixture fixture{.width = 360, .height = 180};
+  fixture.value = [](int c, int) { return c; };
+  for (const double west_deg : {-180.0, -180.5, 0.0, -0.5}) {
+    SCOPED_TRACE(west_deg);
+    fixture.geotransform = {{west_deg, 1, 0, 90, 0, -1}};
+    const std::string path = file_in(folder, "a.tif");
+    write_raster(path, fixture);
+    Sampler sampler = sampler_of({path});
+    const Lattice lattice(kGeodetic, 1);
+    const PostWindow window = around(lattice, west_deg, 15, 8, 2);
+    const std::vector<float> heights = sampled(sampler, lattice, window);
+    for (std::int32_t k = 0; k < window.width_posts; ++k) {
+      // From the seam, eastwards; the last pixel's centre stands half a degree before it.
+      const double east_deg =
+          std::remainder(lattice.longitude_deg(window.i0 + k) - west_deg, 360.0);
+      double expected = east_deg > 0 ? east_deg - 0.5 : 359.5 + east_deg;
+      if (std::abs(east_deg) < 0.5) expected = (0.5 - east_deg) * 359;
+      EXPECT_NEAR(heights[static_cast<std::size_t>(k)], expected, 1e-3) << east_deg;
+    }
+  }
+}
+
 TEST(Sampling, APoleHasOneHeight) {
   const TemporaryFolder folder;
   RasterFixture fixture{.width = 36, .height = 18};
