@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "formats/byte_cursor.h"
 #include "formats/hdf5_structure.h"
-#include "formats/little_endian.h"
 #include "formats/result.h"
 
 namespace qmpipe {
@@ -19,39 +19,6 @@ namespace qmpipe {
 // The address of what is not there.
 inline constexpr std::uint64_t kNoAddress = std::numeric_limits<std::uint64_t>::max();
 inline constexpr std::size_t kMostHdf5Dimensions = 4;
-
-// Numbers one after the other; past the end they are 0 and failed() says so.
-class ByteCursor {
- public:
-  explicit ByteCursor(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
-
-  std::uint8_t u8() { return number<std::uint8_t>(); }
-  std::uint16_t u16() { return number<std::uint16_t>(); }
-  std::uint32_t u32() { return number<std::uint32_t>(); }
-  std::uint64_t u64() { return number<std::uint64_t>(); }
-  void skip(std::size_t count) { take(count); }
-  std::span<const std::uint8_t> take(std::size_t count) {
-    if (count > bytes_.size()) {
-      failed_ = true;
-      count = bytes_.size();
-    }
-    const auto taken = bytes_.first(count);
-    bytes_ = bytes_.subspan(count);
-    return taken;
-  }
-  std::size_t left() const { return bytes_.size(); }
-  bool failed() const { return failed_; }
-
- private:
-  template <class T>
-  T number() {
-    const auto taken = take(sizeof(T));
-    return taken.size() == sizeof(T) ? load_little_endian<T>(taken.data()) : T{0};
-  }
-
-  std::span<const std::uint8_t> bytes_;
-  bool failed_ = false;
-};
 
 enum class Hdf5MessageType : std::uint16_t {
   kDataspace = 0x1,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/byte_cursor.h"
 #include "formats/file_bytes.h"
 #include "formats/file_seal.h"
 #include "formats/folders.h"
@@ -26,21 +27,6 @@ void append(std::vector<std::uint8_t>& bytes, T value) {
   bytes.resize(bytes.size() + sizeof(T));
   store_little_endian(bytes.data() + bytes.size() - sizeof(T), value);
 }
-
-// Reads one number after the other. REQUIRES: there are enough.
-class Numbers {
- public:
-  explicit Numbers(std::span<const std::uint8_t> bytes) : at_(bytes.data()) {}
-  template <class T>
-  T next() {
-    const T value = load_little_endian<T>(at_);
-    at_ += sizeof(T);
-    return value;
-  }
-
- private:
-  const std::uint8_t* at_;
-};
 
 // Empty when the tile may stand in a survey.
 std::string fault_of(const SurveyedTile& tile, const TilingScheme& scheme) {
@@ -96,7 +82,7 @@ Result<SurveyedZoom> parse_surveyed_zoom(std::span<const std::uint8_t> bytes, st
   if (bytes.size() < kHeadBytes || !std::equal(kMagic.begin(), kMagic.end(), bytes.begin())) {
     return Error{"it holds no survey of this version"};
   }
-  Numbers numbers(bytes.subspan(kMagic.size()));
+  ByteCursor numbers(bytes.subspan(kMagic.size()));
   if (numbers.next<std::int32_t>() != zoom) return Error{"it holds another zoom's survey"};
   const auto count = numbers.next<std::int32_t>();
   if (count < 0 || bytes.size() - kHeadBytes != static_cast<std::size_t>(count) * kTileBytes) {

@@ -124,6 +124,26 @@ void compare_values(const json& was, const json& is, std::vector<std::string>& d
                   });
 }
 
+// What a text that was kept and the one of now differ in; `foreign` where the kept one is none of ours.
+// `compare_own` has what only one kind of text holds between its version and its values.
+template <class CompareOwn>
+std::vector<std::string> differences_between(const std::string& earlier, const std::string& now,
+                                             const char* foreign,
+                                             const CompareOwn& compare_own) try {
+  if (earlier == now) return {};
+  const json was = json::parse(earlier);
+  const json is = json::parse(now);
+  std::vector<std::string> differences;
+  compare_versions(was, is, differences);
+  compare_own(was, is, differences);
+  compare_values(was.at("parameters"), is.at("parameters"), differences);
+  // Only a finished set's has them.
+  if (is.contains("texts")) compare_values(was.at("texts"), is.at("texts"), differences);
+  return differences;
+} catch (const json::exception&) {
+  return {foreign};
+}
+
 }  // namespace
 
 std::string provenance_of(const BuildOptions& options) {
@@ -135,20 +155,13 @@ std::string provenance_of(const BuildOptions& options) {
 }
 
 std::vector<std::string> provenance_differences(const std::string& earlier,
-                                                const std::string& now) try {
-  if (earlier == now) return {};
-  const json was = json::parse(earlier);
-  const json is = json::parse(now);
-  std::vector<std::string> differences;
-  compare_versions(was, is, differences);
-  if (was.at("inputs_hash") != is.at("inputs_hash")) {
-    differences.emplace_back("the inputs were others, or have changed (their sizes or times)");
-  }
-  compare_values(was.at("parameters"), is.at("parameters"), differences);
-  compare_values(was.at("texts"), is.at("texts"), differences);
-  return differences;
-} catch (const json::exception&) {
-  return {"its report was written by another program"};
+                                                const std::string& now) {
+  return differences_between(
+      earlier, now, "its report was written by another program",
+      [](const json& was, const json& is, std::vector<std::string>& differences) {
+        if (was.at("inputs_hash") == is.at("inputs_hash")) return;
+        differences.emplace_back("the inputs were others, or have changed (their sizes or times)");
+      });
 }
 
 std::string fingerprint_of(const BuildOptions& options) {
@@ -159,17 +172,12 @@ std::string fingerprint_of(const BuildOptions& options) {
 }
 
 std::vector<std::string> fingerprint_differences(const std::string& earlier,
-                                                 const std::string& now) try {
-  if (earlier == now) return {};
-  const json was = json::parse(earlier);
-  const json is = json::parse(now);
-  std::vector<std::string> differences;
-  compare_versions(was, is, differences);
-  compare_inputs(was.at("inputs"), is.at("inputs"), differences);
-  compare_values(was.at("parameters"), is.at("parameters"), differences);
-  return differences;
-} catch (const json::exception&) {
-  return {"the journal was written by another program"};
+                                                 const std::string& now) {
+  return differences_between(
+      earlier, now, "the journal was written by another program",
+      [](const json& was, const json& is, std::vector<std::string>& differences) {
+        compare_inputs(was.at("inputs"), is.at("inputs"), differences);
+      });
 }
 
 }  // namespace qmpipe

@@ -197,8 +197,9 @@ bool RunRecord::is_unfinished(const fs::path& folder) {
   if (!bytes) return fs::exists(folder / kJournalName);
   const auto content = parse_journal(*bytes);
   if (!content) return true;
-  return content->lines.empty() || !json::accept(content->lines.back()) ||
-         !json::parse(content->lines.back()).contains("finished");
+  // A line that is no JSON contains nothing.
+  return content->lines.empty() ||
+         !json::parse(content->lines.back(), nullptr, false).contains("finished");
 }
 
 void RunRecord::begin_output(const fs::path& output) {

@@ -17,7 +17,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kStopLookedAt = 50ms;
 // From a head's first byte to its last.
 constexpr auto kHeadTime = 5s;
 constexpr auto kSendStart = 10s;
@@ -91,7 +90,7 @@ bool HttpConnection::send(std::string_view bytes) {
     }
     if (Clock::now() >= deadline) return false;
     pollfd waited = {.fd = socket_, .events = POLLOUT, .revents = 0};
-    ::poll(&waited, 1, static_cast<int>(std::chrono::milliseconds(kStopLookedAt).count()));
+    ::poll(&waited, 1, static_cast<int>(kStopLookedAt.count()));
   }
   return true;
 }

@@ -11,6 +11,9 @@
 
 namespace qmpipe {
 
+// How long a wait goes on before it looks whether the server is to end.
+inline constexpr std::chrono::milliseconds kStopLookedAt{50};
+
 class HttpConnection {
  public:
   using Clock = std::chrono::steady_clock;

@@ -32,7 +32,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr int kBacklog = 512;
-constexpr auto kStopLookedAt = 50ms;
 constexpr auto kFirstRequest = 5s;
 // An idle connection holds a thread.
 constexpr auto kNextRequest = 2s;
@@ -174,7 +173,7 @@ void serve_connection(HttpConnection& connection, const HttpServer::Handler& han
 int accept_next(int listening, const std::atomic<bool>& stop) {
   while (!stop) {
     pollfd waited = {.fd = listening, .events = POLLIN, .revents = 0};
-    const int slice_ms = static_cast<int>(std::chrono::milliseconds(kStopLookedAt).count());
+    const int slice_ms = static_cast<int>(kStopLookedAt.count());
     if (::poll(&waited, 1, slice_ms) <= 0) continue;
     const int socket = ::accept4(listening, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (socket >= 0) {
