@@ -363,9 +363,11 @@ class TamperedRuns(ResumeTest):
         out = self.unfinished("damaged-journal")
         journal = run_folder(out) / "journal"
         lines = journal.read_bytes().split(b"\n")
-        lines[1] = lines[1].replace(b"zoom", b"ZOOM")
+        self.assertIn(b"output_begun", lines[1])
+        self.assertIn(b"surveyed_zoom", lines[2])
+        lines[2] = lines[2].replace(b"zoom", b"ZOOM")
         journal.write_bytes(b"\n".join(lines))
-        self.refused(out, says=["journal: line 2 is damaged"])
+        self.refused(out, says=["journal: line 3 is damaged"])
 
     def test_damaged_or_missing_segments_are_refused(self):
         out = self.unfinished("segments")
