@@ -154,8 +154,7 @@ class Hdf5Structure::Parser {
     if (!node) return node.error();
     for (std::size_t k = 0; k < node->children.size(); ++k) {
       if (node->level > 0) {
-        if (const auto error =
-                read_chunks(node->children[k], node->level - 1, rank, limit, chunks)) {
+        if (auto error = read_chunks(node->children[k], node->level - 1, rank, limit, chunks)) {
           return error;
         }
         continue;
@@ -210,8 +209,8 @@ class Hdf5Structure::Parser {
     const auto node = node_at(address, NodeType::kGroup, 8, level);
     if (!node) return node.error();
     for (const std::uint64_t child : node->children) {
-      const auto error = node->level > 0 ? read_names(child, node->level - 1, heap, objects)
-                                         : read_symbols(child, heap, objects);
+      auto error = node->level > 0 ? read_names(child, node->level - 1, heap, objects)
+                                   : read_symbols(child, heap, objects);
       if (error) return error;
     }
     return std::nullopt;

@@ -66,8 +66,8 @@ std::int64_t columns_of_a_turn(const GridInfo& info) {
   return std::abs(pixels - whole) <= kWrapTolerancePixels ? static_cast<std::int64_t>(whole) : 0;
 }
 
-RasterGrid::RasterGrid(const GridInfo& info, std::unique_ptr<CrsTransform> transform)
-    : info_(info), transform_(std::move(transform)) {
+RasterGrid::RasterGrid(GridInfo info, std::unique_ptr<CrsTransform> transform)
+    : info_(std::move(info)), transform_(std::move(transform)) {
   const RasterPlacement& placement = *info_.placement;
   if (placement.is_identity) {
     // It holds a connection to PROJ's database.

@@ -99,7 +99,7 @@ class RasterGrid {
   std::optional<LonLat> globe_at(const PixelPoint& point) const;
 
  private:
-  RasterGrid(const GridInfo& info, std::unique_ptr<CrsTransform> transform);
+  RasterGrid(GridInfo info, std::unique_ptr<CrsTransform> transform);
   void measure();
 
   GridInfo info_;
