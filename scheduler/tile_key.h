@@ -24,8 +24,8 @@ struct TileKey {
   }
 };
 
-// The deepest zoom whose lattice indices, with a halo around them, fit 32 bits in both schemes.
-inline constexpr std::int32_t kMaxZoom = 21;
+// The deepest zoom: posts 5 mm apart. Tiles are counted in 32 bits, the lattice's posts in 64.
+inline constexpr std::int32_t kMaxZoom = 24;
 
 // REQUIRES: key.zoom > 0.
 constexpr TileKey parent_of(const TileKey& key) {

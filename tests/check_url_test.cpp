@@ -183,9 +183,9 @@ TEST(CheckUrl, LooksForHolesInManyRangesAtTheSampleOnly) {
 TEST(CheckUrl, DeepZoomsAreToldAndLeftAlone) {
   const SetFixture set(testing::sixteen_tiles());
   set.change_layer([](LayerJson& layer) {
-    layer.available.resize(25);
-    layer.available[24].push_back({5, 5, 5, 5});
-    layer.max_zoom = 24;
+    layer.available.resize(28);
+    layer.available[27].push_back({5, 5, 5, 5});
+    layer.max_zoom = 27;
   });
   const CheckReport report = Served(set).check();
   EXPECT_THAT(codes(report, CheckSeverity::kHint), ElementsAre("deeper-not-checked"));

@@ -204,17 +204,51 @@ TEST(Lattice, CoordinatesAscendAndEndAtTheSchemesLimits) {
   }
 }
 
-// kMaxZoom promises that all indices fit 32 bits: one past the last post and its halo too.
-TEST(Lattice, IndicesOfTheDeepestZoomFit32Bits) {
+TEST(Lattice, TheDeepestZoomHasAllItsPosts) {
   for (const TilingScheme& scheme : {kGeodetic, kMercator}) {
-    const auto columns = (std::int64_t{scheme.columns(0)} << kMaxZoom) * kTileIntervals;
-    ASSERT_LE(columns + kTilePosts, std::int64_t{std::numeric_limits<std::int32_t>::max()});
+    const std::int64_t columns = (std::int64_t{scheme.columns(0)} << kMaxZoom) * kTileIntervals;
+    ASSERT_GT(columns, std::int64_t{std::numeric_limits<std::int32_t>::max()});
     const Lattice lattice(scheme, kMaxZoom);
     EXPECT_EQ(lattice.columns(), columns);
     const TileKey last = {kMaxZoom, scheme.columns(kMaxZoom) - 1, scheme.rows(kMaxZoom) - 1};
     const PostWindow window = Lattice::tile_window(last, 1);
     EXPECT_EQ(window.i0 + window.width_posts, lattice.columns() + 2);
     EXPECT_EQ(window.j0 + window.height_posts, lattice.rows() + 1);
+    EXPECT_EQ(lattice.wrap_column(window.i0 + window.width_posts - 1), 1);
+    EXPECT_EQ(lattice.wrap_column(-1), columns - 1);
+    EXPECT_EQ(lattice.wrap_column(-3 * columns - 2), columns - 2);
+  }
+}
+
+// A tile's corners are the lattice's, columns and rows lead back to themselves, and neighbours share
+// their sides: where posts are 5 mm apart, doubles must not run out of digits.
+TEST(Lattice, PostsOfDeepZoomsAreToldApart) {
+  for (const TilingScheme& scheme : {kGeodetic, kMercator}) {
+    for (std::uint64_t seed = 1; seed <= 500; ++seed) {
+      SCOPED_TRACE("seed " + std::to_string(seed));
+      std::mt19937_64 random(seed);
+      const std::int32_t zoom = kMaxZoom - static_cast<std::int32_t>(seed % 4);
+      const Lattice lattice(scheme, zoom);
+      const TileKey key = random_key(random, scheme, zoom);
+      const PostWindow window = Lattice::tile_window(key, 0);
+      const RectangleDeg rectangle = scheme.rectangle_deg(key);
+      ASSERT_TRUE(same_bits(lattice.longitude_deg(window.i0), rectangle.west_deg));
+      ASSERT_TRUE(same_bits(lattice.longitude_deg(window.i0 + 256), rectangle.east_deg));
+      ASSERT_TRUE(same_bits(lattice.latitude_deg(window.j0), rectangle.south_deg));
+      ASSERT_TRUE(same_bits(lattice.latitude_deg(window.j0 + 256), rectangle.north_deg));
+      ASSERT_NEAR(rectangle.east_deg - rectangle.west_deg, 256 * lattice.column_spacing_deg(),
+                  1e-12);
+      for (std::int32_t k = 0; k < 256; ++k) {
+        const std::int64_t i = window.i0 + k;
+        const std::int64_t j = window.j0 + k;
+        ASSERT_EQ(std::llround(lattice.column_at(lattice.longitude_deg(i))), i);
+        ASSERT_EQ(std::llround(lattice.row_at(lattice.latitude_deg(j))), j);
+        // Steps differ by no more than a hundredth of one from what they are on the globe.
+        const double step_deg = lattice.latitude_deg(j + 1) - lattice.latitude_deg(j);
+        const double whole_deg = (rectangle.north_deg - rectangle.south_deg) / 256;
+        ASSERT_NEAR(step_deg / whole_deg, 1, 0.01);
+      }
+    }
   }
 }
 
