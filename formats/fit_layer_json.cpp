@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <optional>
 #include <utility>
 
 #include "formats/layer_json.h"
 #include "formats/quantized_mesh.h"
+#include "scheduler/elementary.h"
 
 namespace qmpipe {
 namespace {
@@ -60,9 +60,9 @@ Projection guess_projection(const std::vector<std::pair<TileKey, QuantizedMesh>>
   };
   for (const auto& [key, mesh] : sample) {
     const Vec3& centre = mesh.header.sphere_centre_ecef_m;
-    const double longitude_deg = std::atan2(centre[1], centre[0]) * 180 / std::numbers::pi;
+    const double longitude_deg = atan2_deg(centre[1], centre[0]);
     if (!std::isfinite(longitude_deg)) continue;
-    const double middle = (key.x + 0.5) / std::exp2(key.zoom);
+    const double middle = std::ldexp(key.x + 0.5, -key.zoom);
     geodetic_off_deg += off_deg(longitude_deg, middle * 180 - 180);
     mercator_off_deg += off_deg(longitude_deg, middle * 360 - 180);
   }

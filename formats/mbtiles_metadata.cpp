@@ -16,7 +16,7 @@ using Rows = std::vector<std::pair<std::string, std::string>>;
 std::int32_t first_zoom(const RectangleDeg& bounds, const ZoomSpan& zooms) {
   const double size_deg =
       std::max(bounds.east_deg - bounds.west_deg, bounds.north_deg - bounds.south_deg);
-  const double zoom = std::floor(std::log2(180 / size_deg));
+  const double zoom = std::ilogb(180 / size_deg);
   return static_cast<std::int32_t>(std::clamp<double>(zoom, zooms.min_zoom, zooms.max_zoom));
 }
 

@@ -18,6 +18,7 @@
 #include "formats/point_text.h"
 #include "formats/wgs84.h"
 #include "scheduler/check.h"
+#include "scheduler/elementary.h"
 
 namespace qmpipe {
 namespace {
@@ -104,8 +105,8 @@ std::array<double, 3> units_of(const fs::path& path, const RasterCrs& crs,
   const double middle_deg = (latitudes[0] + latitudes[1]) / 2 * degrees;
   constexpr double kRadians = std::numbers::pi / 180;
   const auto [across_m, along_m] = curvature_radii(middle_deg);
-  return {degrees * kRadians * across_m * std::cos(middle_deg * kRadians),
-          degrees * kRadians * along_m, height_m};
+  return {degrees * kRadians * across_m * cos_deg(middle_deg), degrees * kRadians * along_m,
+          height_m};
 }
 
 PointCloud cloud_in(const RasterCrs& crs) {

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "scheduler/check.h"
+#include "scheduler/elementary.h"
 
 namespace qmpipe {
 namespace {
@@ -275,7 +276,7 @@ bool SquareThinner::add(const PointPlace& value) {
 
 void round_to_decimals(RawPoints& points, const std::array<int, 2>& decimals, double fewest_steps) {
   if (points.values.empty()) return;
-  std::array<double, 2> steps = {std::pow(10, decimals[0]), std::pow(10, decimals[1])};
+  std::array<double, 2> steps = {whole_power(10, decimals[0]), whole_power(10, decimals[1])};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     double& s = steps[axis / 2];
     const double middle = middle_of(points.values, axis);

@@ -16,6 +16,11 @@ namespace {
 constexpr double kWrapTolerancePixels = 0.01;
 // The same place after a transformation: a micrometre.
 constexpr double kSamePlaceDeg = 1e-11;
+// The last bits of what PROJ answers depend on the processor. A thousandth of a pixel is some
+// million times as much, so that but for one place in a million they are gone, and it is small beside
+// the hundredth to which places between anchor posts are exact.
+constexpr double kSnapsPerPixel = 1024;
+constexpr double kSnapsPerDegree = 1e9;
 
 std::vector<MapPoint> sample_points(const GridInfo& info) {
   constexpr int kSteps = 8;
@@ -38,6 +43,19 @@ bool leaves_degrees_alone(const CrsTransform& transform, std::span<const MapPoin
     return same && std::abs(same->y - at.latitude_deg) <= kSamePlaceDeg &&
            std::abs(std::remainder(same->x - at.longitude_deg, 360.0)) <= kSamePlaceDeg;
   });
+}
+
+PixelPoint snapped(const PixelPoint& p) {
+  return {.column = std::floor(p.column * kSnapsPerPixel + 0.5) / kSnapsPerPixel,
+          .row = std::floor(p.row * kSnapsPerPixel + 0.5) / kSnapsPerPixel};
+}
+
+// Outwards; whole degrees stay what they are.
+RectangleDeg widened(const RectangleDeg& bounds) {
+  return {.west_deg = std::floor(bounds.west_deg * kSnapsPerDegree) / kSnapsPerDegree,
+          .south_deg = std::floor(bounds.south_deg * kSnapsPerDegree) / kSnapsPerDegree,
+          .east_deg = std::ceil(bounds.east_deg * kSnapsPerDegree) / kSnapsPerDegree,
+          .north_deg = std::ceil(bounds.north_deg * kSnapsPerDegree) / kSnapsPerDegree};
 }
 
 // 0 where there is no turn.
@@ -114,7 +132,8 @@ std::optional<PixelPoint> RasterGrid::pixel_at(double longitude_deg, double lati
     map = *projected;
   }
   if (turn_ > 0) map.x -= turn_ * std::floor((map.x - middle_x_ + turn_ / 2) / turn_);
-  return info_.plane.pixel_of(map);
+  const PixelPoint pixel = info_.plane.pixel_of(map);
+  return transform_ ? snapped(pixel) : pixel;
 }
 
 std::optional<LonLat> RasterGrid::globe_at(const PixelPoint& point) const {
@@ -141,7 +160,7 @@ void RasterGrid::measure() {
   const std::optional<RectangleDeg> bounds = bounds_on_globe(
       size, to_globe,
       [this](const LonLat& p) { return pixel_at(p.longitude_deg, p.latitude_deg); });
-  if (bounds) info_.bounds_deg = *bounds;
+  if (bounds) info_.bounds_deg = widened(*bounds);
   info_.pixel_deg = smallest_pixel_deg(size, to_globe);
 }
 

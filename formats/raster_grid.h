@@ -91,7 +91,9 @@ class RasterGrid {
 
   const GridInfo& info() const { return info_; }
 
-  // Where a point of the globe (WGS84) lies on the grid, exactly transformed; may lie outside it.
+  // Where a point of the globe (WGS84) lies on the grid; may lie outside it. Exactly transformed,
+  // then rounded to 1/1024 pixel, so that the same on every processor; in degrees of WGS84: not
+  // rounded.
   // Where the CRS goes round the globe along x, x is first moved by whole turns to within half a
   // turn of the grid's middle. None where the CRS does not reach the point.
   std::optional<PixelPoint> pixel_at(double longitude_deg, double latitude_deg) const;

@@ -2,7 +2,8 @@
 #pragma once
 
 #include <cmath>
-#include <numbers>
+
+#include "scheduler/elementary.h"
 
 namespace qmpipe {
 
@@ -16,7 +17,7 @@ struct CurvatureRadii {
 };
 
 inline CurvatureRadii curvature_radii(double latitude_deg) {
-  const double sine = std::sin(latitude_deg * (std::numbers::pi / 180));
+  const double sine = sin_deg(latitude_deg);
   constexpr double kAxesRatio = kPolarRadiusM / kEquatorialRadiusM;
   constexpr double kEccentricitySquared = 1 - kAxesRatio * kAxesRatio;
   const double w = std::sqrt(1 - kEccentricitySquared * sine * sine);

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "scheduler/elementary.h"
+
 #include "pipeline/svg.h"
 
 namespace qmpipe {
@@ -20,8 +22,8 @@ class Axis {
  public:
   Axis(Scale scale, double low, double high) : scale_(scale) {
     if (scale_ == Scale::kLogarithmic) {
-      low_ = std::floor(std::log10(low) * 4) / 4;
-      high_ = std::max(std::ceil(std::log10(high) * 4) / 4, low_ + 0.25);
+      low_ = std::floor(decimal_logarithm(low) * 4) / 4;
+      high_ = std::max(std::ceil(decimal_logarithm(high) * 4) / 4, low_ + 0.25);
     } else {
       low_ = std::min(low, 0.0);
       high_ = high > low_ ? high * 1.03 : low_ + 1;
@@ -30,7 +32,7 @@ class Axis {
 
   // 0 at the axis's beginning, 1 at its end.
   double part(double value) const {
-    const double at = scale_ == Scale::kLogarithmic ? std::log10(value) : value;
+    const double at = scale_ == Scale::kLogarithmic ? decimal_logarithm(value) : value;
     return (at - low_) / (high_ - low_);
   }
 
@@ -39,12 +41,13 @@ class Axis {
     if (scale_ == Scale::kLogarithmic) {
       const auto last = static_cast<int>(std::floor(high_));
       for (auto power = static_cast<int>(std::floor(low_)); power <= last; ++power) {
-        for (const double digit : {1.0, 2.0, 5.0}) add_within(digit * std::pow(10, power), ticks);
+        for (const double digit : {1.0, 2.0, 5.0})
+          add_within(digit * whole_power(10, power), ticks);
       }
       return ticks;
     }
     const double raw = (high_ - low_) / 5;
-    const double power = std::pow(10, std::floor(std::log10(raw)));
+    const double power = whole_power(10, static_cast<int>(std::floor(decimal_logarithm(raw))));
     const double step = power * (raw / power < 1.5 ? 1 : raw / power < 3.5 ? 2 : 5);
     const auto last = static_cast<int>(std::floor(high_ / step));
     for (auto k = static_cast<int>(std::ceil(low_ / step)); k <= last; ++k) {

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <numbers>
 #include <set>
 
 #include "formats/tile_set.h"
 #include "pipeline/check_sample.h"
 #include "scheduler/check.h"
+#include "scheduler/elementary.h"
 #include "stages/geodesy.h"
 
 namespace qmpipe {
@@ -46,11 +46,10 @@ HttpQuestion request_of(const AskingPage& page, const WebAddress& address,
 
 // Roughly where on the globe, good enough to recognise a place.
 std::string place_text(const Vec3& point_ecef) {
-  constexpr double kDegPerRad = 180 / std::numbers::pi;
   return fmt::format(
-      "{:.2f}, {:.2f} degrees (longitude, latitude)",
-      std::atan2(point_ecef[1], point_ecef[0]) * kDegPerRad,
-      std::atan2(point_ecef[2], std::hypot(point_ecef[0], point_ecef[1])) * kDegPerRad);
+      "{:.2f}, {:.2f} degrees (longitude, latitude)", atan2_deg(point_ecef[1], point_ecef[0]),
+      atan2_deg(point_ecef[2],
+                std::sqrt(point_ecef[0] * point_ecef[0] + point_ecef[1] * point_ecef[1])));
 }
 
 bool can_be_cached(const HttpAnswer& answer) {

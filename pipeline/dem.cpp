@@ -10,6 +10,7 @@
 #include "formats/errors.h"
 #include "formats/quantized_mesh.h"
 #include "formats/wgs84.h"
+#include "scheduler/elementary.h"
 #include "stages/void_posts.h"
 
 namespace qmpipe {
@@ -36,7 +37,7 @@ PostSpacing spacing_on_ellipsoid(const RasterInfo& info) {
                   "check its bounds with gdalinfo; name the right CRS with --source-crs EPSG:n");
   }
   constexpr double kDegree = std::numbers::pi / 180;
-  const double cosine = std::cos(middle_deg * kDegree);
+  const double cosine = cos_deg(middle_deg);
   const auto [across_m, along_m] = curvature_radii(middle_deg);
   return {.x_m = std::abs(info.plane.x_per_column) * info.plane.unit * kDegree * across_m * cosine,
           .y_m = std::abs(info.plane.y_per_row) * info.plane.unit * kDegree * along_m};

@@ -8,6 +8,7 @@
 
 #include "pipeline/svg.h"
 #include "scheduler/check.h"
+#include "scheduler/elementary.h"
 
 namespace qmpipe {
 namespace {
@@ -24,7 +25,7 @@ std::vector<double> thresholds_m(double finest_m, double coarsest_m, std::size_t
   std::vector<double> values;
   for (std::size_t k = 0; k < count; ++k) {
     const double share = static_cast<double>(k) / static_cast<double>(count - 1);
-    values.push_back(low * std::pow(high / low, share));
+    values.push_back(low * power(high / low, share));
   }
   // Not a rounding error short of the coarsest level.
   values.back() = high;

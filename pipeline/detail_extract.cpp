@@ -4,16 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "scheduler/check.h"
+#include "scheduler/elementary.h"
 #include "stages/detail_block.h"
 
 namespace qmpipe {
 
 double svo_at_distance_m(double distance_m, const DetailView& view) {
-  const double half_rad = view.fov_deg * std::numbers::pi / 360;
-  return view.pixels * 2 * distance_m * std::tan(half_rad) / view.screen_height;
+  const auto [sine, cosine] = sin_cos_deg(view.fov_deg / 2);
+  return view.pixels * 2 * distance_m * (sine / cosine) / view.screen_height;
 }
 
 namespace {
@@ -65,8 +65,12 @@ double distance_to_block_m(const DetailModel& model, std::size_t block,
       high[k] = std::max(high[k], place[k]);
     }
   }
-  return std::hypot((low[0] + high[0]) / 2 - eye_m[0], (low[1] + high[1]) / 2 - eye_m[1],
-                    (low[2] + high[2]) / 2 - eye_m[2]);
+  double squared = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double along = (low[k] + high[k]) / 2 - eye_m[k];
+    squared += along * along;
+  }
+  return std::sqrt(squared);
 }
 
 DetailLevels levels_from_eye(const DetailModel& model, const std::array<double, 3>& eye_m,

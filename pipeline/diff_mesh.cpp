@@ -7,12 +7,12 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 #include <optional>
 #include <tuple>
 
 #include "formats/oct_normal.h"
+#include "scheduler/elementary.h"
 #include "scheduler/tiling_scheme.h"
 #include "stages/geodesy.h"
 
@@ -212,7 +212,7 @@ class MeshComparer {
       if (a_.normals[i] == b_.normals[k]) continue;
       is_same = false;
       const double cosine = dot(decode_oct_normal(a_.normals[i]), decode_oct_normal(b_.normals[k]));
-      const double angle_deg = std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
+      const double angle_deg = atan2_deg(std::sqrt(std::max(0.0, 1 - cosine * cosine)), cosine);
       found_.largest_normal_deg = std::max(found_.largest_normal_deg, angle_deg);
     }
     if (!is_same) say(fmt::format("normals by up to {:.3g} degrees", found_.largest_normal_deg));

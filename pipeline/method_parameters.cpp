@@ -10,6 +10,7 @@
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "pipeline/method.h"
+#include "scheduler/elementary.h"
 
 namespace qmpipe {
 namespace {
@@ -92,7 +93,7 @@ ZoomSeries::ZoomSeries(std::vector<double> values, double factor)
 double ZoomSeries::at(std::int32_t zoom) const {
   const auto k = static_cast<std::size_t>(zoom);
   if (k < values_.size()) return values_[k];
-  return values_.back() * std::pow(factor_, static_cast<double>(k + 1 - values_.size()));
+  return values_.back() * whole_power(factor_, static_cast<int>(k + 1 - values_.size()));
 }
 
 std::string ZoomSeries::text() const {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "formats/errors.h"
+#include "scheduler/elementary.h"
 #include "stages/void_posts.h"
 
 namespace qmpipe {
@@ -32,7 +33,9 @@ SizeScale scale_of(Method method, const Dem& dem) {
       std::min(width_m / (grid.width_posts - 1), height_m / (grid.height_posts - 1));
   switch (method) {
     case Method::kPsGrid:
-      return {.name = "d_g", .finest = spacing_m / 2, .coarsest = std::hypot(width_m, height_m)};
+      return {.name = "d_g",
+              .finest = spacing_m / 2,
+              .coarsest = std::sqrt(width_m * width_m + height_m * height_m)};
     case Method::kPsHierarchy:
       return {.name = "h_c",
               .finest = 1,
@@ -53,7 +56,7 @@ bool counts_what_is_removed(const SizeScale& scale) {
 }
 
 double size_at(const SizeScale& scale, double place) {
-  const double size = scale.finest * std::pow(scale.coarsest / scale.finest, place);
+  const double size = scale.finest * power(scale.coarsest / scale.finest, place);
   if (counts_what_is_removed(scale)) return 100 - size;
   return std::string_view(scale.name) == "h_c" ? std::round(size) : size;
 }
@@ -61,7 +64,7 @@ double size_at(const SizeScale& scale, double place) {
 double place_of(const SizeScale& scale, double value) {
   const double size = counts_what_is_removed(scale) ? 100 - value : value;
   if (!(size > 0)) return 1;
-  const double place = std::log(size / scale.finest) / std::log(scale.coarsest / scale.finest);
+  const double place = logarithm(size / scale.finest) / logarithm(scale.coarsest / scale.finest);
   return std::clamp(place, 0.0, 1.0);
 }
 

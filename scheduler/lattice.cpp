@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "scheduler/check.h"
+#include "scheduler/elementary.h"
 
 namespace qmpipe {
 namespace {
@@ -37,7 +38,7 @@ double Lattice::latitude_deg(std::int64_t j) const {
   if (scheme_.projection() == Projection::kGeodetic) return -90.0 + row * (180.0 / intervals);
   // The Mercator ordinate as a fraction of pi is exact; symmetric rows give opposite latitudes.
   const double y = 2.0 * row / intervals - 1.0;
-  return std::atan(std::sinh(std::numbers::pi * y)) * (180.0 / std::numbers::pi);
+  return atan2_deg(hyperbolic_sine(std::numbers::pi * y), 1);
 }
 
 double Lattice::column_at(double longitude_deg) const {
@@ -51,7 +52,9 @@ double Lattice::row_at(double latitude_deg) const {
   }
   const double clamped_deg =
       std::clamp(latitude_deg, this->latitude_deg(0), this->latitude_deg(rows_ - 1));
-  const double y = std::asinh(std::tan(clamped_deg * (std::numbers::pi / 180.0)));
+  const auto [sine, cosine] = sin_cos_deg(std::abs(clamped_deg));
+  // The same for both hemispheres, and no difference of near numbers in the logarithm.
+  const double y = std::copysign(logarithm((1 + sine) / cosine), clamped_deg);
   return (y / std::numbers::pi + 1.0) / 2.0 * intervals;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "scheduler/elementary.h"
 #include "stages/geodesy.h"
 
 namespace qmpipe {
@@ -11,7 +12,7 @@ namespace {
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 double cos_squared_deg(double latitude_deg) {
-  const double c = std::abs(latitude_deg) == 90 ? 0 : std::cos(latitude_deg * kRadPerDeg);
+  const double c = cos_deg(latitude_deg);
   return c * c;
 }
 }  // namespace

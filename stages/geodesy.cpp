@@ -3,41 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "scheduler/check.h"
+#include "scheduler/elementary.h"
 
 namespace qmpipe {
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr int kSphereSteps = 16;
 constexpr int kSphereFirstStep = 8;
 // Far enough never to be hidden, near enough for the client's float arithmetic.
 constexpr double kNeverHidden = 1e6;
-
-struct SinCos {
-  double sin;
-  double cos;
-};
-
-// Exact where a pole or the antimeridian needs it: sin and cos of multiples of 90 degrees.
-SinCos sin_cos_deg(double angle_deg) {
-  const double quarter = angle_deg / 90.0;
-  if (quarter == std::floor(quarter)) {
-    switch ((static_cast<int>(quarter) % 4 + 4) % 4) {
-      case 0:
-        return {0, 1};
-      case 1:
-        return {1, 0};
-      case 2:
-        return {0, -1};
-      default:
-        return {-1, 0};
-    }
-  }
-  return {std::sin(angle_deg * kRadPerDeg), std::cos(angle_deg * kRadPerDeg)};
-}
 
 // The latitude and height of a point, from its distance to the axis and its z.
 struct Vertical {
@@ -158,8 +134,8 @@ Vec3 to_ecef(const GeoPoint& point) {
 GeoPoint to_geodetic(const Vec3& point_ecef) {
   const auto& [x, y, z] = point_ecef;
   const Vertical vertical = vertical_through(std::sqrt(x * x + y * y), z);
-  return {.longitude_deg = std::atan2(y, x) / kRadPerDeg,
-          .latitude_deg = std::atan2(vertical.latitude.sin, vertical.latitude.cos) / kRadPerDeg,
+  return {.longitude_deg = atan2_deg(y, x),
+          .latitude_deg = atan2_deg(vertical.latitude.sin, vertical.latitude.cos),
           .height_m = vertical.height_m};
 }
 
@@ -178,8 +154,9 @@ Sphere bounding_sphere(std::span<const Vec3> points_ecef) {
   const Vec3 box = box_centre(points_ecef);
   const bool box_is_better = radius_around(box, points_ecef) < radius_around(ritter, points_ecef);
   Sphere sphere = improved_sphere(box_is_better ? box : ritter, points_ecef);
-  // No rounding may leave a point outside.
-  sphere.radius_m *= 1 + 1e-12;
+  // No rounding may leave a point outside: not ours, nor that of others, who compute a point of the
+  // Earth to some nanometres; on the smallest tiles the first alone would be less than that.
+  sphere.radius_m = sphere.radius_m * (1 + 1e-12) + 1e-8;
   return sphere;
 }
 

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "scheduler/elementary.h"
+
 namespace qmpipe {
 
 MetricFrame::MetricFrame(const PostGrid& grid) : grid_(grid) {}
@@ -42,8 +44,7 @@ FlatScale flat_scale(const PostGrid& grid) {
   const double width_deg = grid.longitude_deg.back() - grid.longitude_deg.front();
   const double height_deg = grid.latitude_deg.back() - grid.latitude_deg.front();
   const double middle_deg = grid.latitude_deg.front() + height_deg / 2;
-  return {.metres_per_u = kMetresPerDegree * width_deg / grid.u_max() *
-                          std::cos(middle_deg * std::numbers::pi / 180),
+  return {.metres_per_u = kMetresPerDegree * width_deg / grid.u_max() * cos_deg(middle_deg),
           .metres_per_v = kMetresPerDegree * height_deg / grid.v_max()};
 }
 

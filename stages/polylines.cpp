@@ -151,7 +151,9 @@ void Simplifier::add_node(std::int32_t post, double longest_edge, bool is_first,
 double Simplifier::squared_error_without(const Node& node) const {
   const IntPoint from = place(nodes_[node.previous].post);
   const IntPoint to = place(nodes_[node.next].post);
-  if (std::hypot(to.x - from.x, to.y - from.y) > node.longest_edge) {
+  const double across = to.x - from.x;
+  const double along = to.y - from.y;
+  if (std::sqrt(across * across + along * along) > node.longest_edge) {
     return std::numeric_limits<double>::infinity();
   }
   const Vec3 a = position(nodes_[node.previous].post);

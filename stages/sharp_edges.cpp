@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <span>
 #include <utility>
 
+#include "scheduler/elementary.h"
 #include "stages/geodesy.h"
 
 namespace qmpipe {
@@ -81,7 +81,7 @@ std::vector<Edge> sharp_edges(const Tin& tin, double angle_deg) {
   }
   const auto starts = by_vertex<HalfEdge>(tin.vertices.size(), upwards);
   const std::vector<Vec3> normals = scaled_normals(tin);
-  const double least_cosine = std::cos(angle_deg * std::numbers::pi / 180);
+  const double least_cosine = cos_deg(angle_deg);
   std::vector<Edge> sharp;
   for (std::size_t k = 0; k < tin.indices.size(); ++k) {
     const std::uint32_t high = tin.indices[k];

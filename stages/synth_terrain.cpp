@@ -7,40 +7,11 @@
 #include <vector>
 
 #include "scheduler/check.h"
+#include "scheduler/elementary.h"
 #include "stages/gradient_noise.h"
 
 namespace qmpipe {
 namespace {
-
-struct SinCos {
-  double sin = 0;
-  double cos = 1;
-};
-
-// Own polynomials, because libms differ in the last bit. |angle_deg| <= 45 inside; exact at
-// multiples of 90 degrees.
-SinCos sin_cos_deg(double angle_deg) {
-  const double quarters = std::floor(angle_deg / 90 + 0.5);
-  const double a = (angle_deg - 90 * quarters) * (std::numbers::pi / 180);
-  const double q = a * a;
-  const double sine =
-      a * (1 + q * (-1.0 / 6 + q * (1.0 / 120 + q * (-1.0 / 5040 +
-                                                     q * (1.0 / 362880 + q * (-1.0 / 39916800))))));
-  const double cosine =
-      1 +
-      q * (-1.0 / 2 + q * (1.0 / 24 + q * (-1.0 / 720 + q * (1.0 / 40320 + q * (-1.0 / 3628800)))));
-  const double turns = std::floor(quarters / 4);
-  switch (static_cast<int>(quarters - 4 * turns)) {
-    case 0:
-      return {sine, cosine};
-    case 1:
-      return {cosine, -sine};
-    case 2:
-      return {-sine, -cosine};
-    default:
-      return {-cosine, sine};
-  }
-}
 
 float smooth_step(float low, float high, float value) {
   const float t = std::clamp((value - low) / (high - low), 0.0F, 1.0F);

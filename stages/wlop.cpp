@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "scheduler/elementary.h"
 #include "stages/point_cells.h"
 
 namespace qmpipe {
@@ -37,7 +38,7 @@ class Wlop {
     for (const SurfacePoint& point : sample) {
       double density = 1;
       cells.for_each_near(point.position, [&](std::uint32_t, double squared_m) {
-        density += std::exp(squared_m * decay_);
+        density += exponential(squared_m * decay_);
       });
       densities.push_back(density);
     }
@@ -67,7 +68,7 @@ class Wlop {
     WeightedSum attraction;
     cells_.for_each_near(point.position, [&](std::uint32_t k, double squared_m) {
       if (squared_m < kSameSquaredM) return;
-      attraction.add(points_[k].position, points_[k].height_m, std::exp(squared_m * decay_));
+      attraction.add(points_[k].position, points_[k].height_m, exponential(squared_m * decay_));
     });
     WeightedSum repulsion;
     int neighbours = 0;
@@ -75,7 +76,7 @@ class Wlop {
       ++neighbours;
       if (squared_m < kSameSquaredM) return;
       repulsion.add(minus(point.position, sample[k].position), point.height_m - sample[k].height_m,
-                    std::exp(squared_m * decay_) / squared_m * densities[k]);
+                    exponential(squared_m * decay_) / squared_m * densities[k]);
     });
     const bool is_drawn = attraction.weight >= kLeastWeight;
     // Itself among them: with a single other one there is no way out.

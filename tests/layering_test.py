@@ -3,7 +3,7 @@
 
 Checked: includes point one way (scheduler <- formats <- stages <- pipeline <- tools; tests and perf
 may include anything); each third-party library is included only where the table below allows it,
-and in no header of ours; every header opens with a comment and has #pragma once; a name that a
+and in no header of ours; no function of the C library whose last bits depend on the processor; every header opens with a comment and has #pragma once; a name that a
 header defines is defined nowhere else; no file is longer than 600 lines; no top-level folder that
 nobody agreed on.
 
@@ -50,6 +50,17 @@ STANDARD = re.compile(r"[a-z0-9_]+$")
 SYSTEM = re.compile(r"((sys|linux|netinet)/\w+|dirent|errno|fcntl|malloc|netdb|poll|pthread|sched|signal|termios|time"
                     r"|unistd)\.h$")
 INCLUDE = re.compile(r'\s*#\s*include\s*([<"])([^>"]+)[>"]')
+
+# glibc has several versions of these and takes one by what the processor can do: their last bits
+# differ. scheduler/elementary.h has all that is needed. (Square roots, remainders, roundings, ldexp
+# and the like are exact.)
+PROCESSOR_DEPENDENT = re.compile(
+    r"(?<![\w.>:])(?:std::|::)?(?:a?(?:sin|cos|tan)h?|atan2|sincos|exp2?|expm1|log(?:2|10|1p)?|pow"
+    r"|hypot|cbrt|erfc?|[lt]gamma)[fl]?\s*\("
+    r"|std::(?:normal|lognormal|exponential|gamma|poisson|weibull|cauchy)_distribution")
+# Files that may use them, and why what they compute reaches no byte of an output.
+PROCESSOR_EXCEPTIONS = {}
+STRINGS_AND_COMMENTS = re.compile(r'"(?:\\.|[^"\\])*"|//.*')
 
 WARN_LINES = 400
 FAIL_LINES = 600
@@ -102,6 +113,16 @@ def check_includes(path, lines):
             yield f"{path}:{number}: {problem}"
 
 
+def check_arithmetic(path, lines):
+    if layer_of(path) not in LAYERS or str(path) in PROCESSOR_EXCEPTIONS:
+        return
+    for number, line in enumerate(lines, start=1):
+        match = PROCESSOR_DEPENDENT.search(STRINGS_AND_COMMENTS.sub('""', line))
+        if match:
+            yield (f"{path}:{number}: {match.group().rstrip('( ')}: its last bits depend on the "
+                   "processor; use scheduler/elementary.h")
+
+
 def check_header(path, lines):
     if not lines or not lines[0].startswith(("//", "/*")):
         yield f"{path}:1: a header opens with a comment that says what it is for"
@@ -139,6 +160,7 @@ def check_tree(root):
             warnings.append(f"{path}: {len(lines)} lines, {WARN_LINES} is long")
         if path.suffix in (".h", ".cpp"):
             violations += check_includes(path, lines)
+            violations += check_arithmetic(path, lines)
             sources[path] = "\n".join(lines)
         if path.suffix == ".h":
             violations += check_header(path, lines)
@@ -158,6 +180,8 @@ GOOD_TREE = {
     "pipeline/a.cpp": '#include "stages/a.h"\n#include <tbb/flow_graph.h>\n'
                       "#include <nlohmann/json.hpp>\n#include <spdlog/spdlog.h>\n",
     "tools/a.cpp": '#include "pipeline/a.h"\n#include <CLI/CLI.hpp>\n#include <nlohmann/json.hpp>\n',
+    "stages/arithmetic.cpp": 'auto a = "sin(x)";  // std::sin(x)\n'
+                             "auto b = exponential(x) + std::sqrt(y) + log_.exp(z) + arcsin(x);\n",
     "tests/helper.h": '// H.\n#pragma once\n#include "tools/a.h"\n#include <gtest/gtest.h>\n',
     "perf/a.cpp": '#include "tests/helper.h"\n#include <benchmark/benchmark.h>\n'
                   "#include <tbb/flow_graph.h>\n",
@@ -214,6 +238,10 @@ FAULTS = [
     ("scheduler/b.hpp", HEADER, "are called .h and .cpp"),
     ("stages/b.cpp", "int x;\n" * 601, "601 lines"),
     ("tests/b.py", "x = 1\n" * 601, "601 lines"),
+    ("stages/b.cpp", "double x = std::sin(y);\n", "stages/b.cpp:1: std::sin: its last bits"),
+    ("formats/b.h", HEADER + "inline double f(double y) { return 2*pow(y, 2); }\n", "last bits"),
+    ("scheduler/b.cpp", "double x = std::hypot (y, z);\n", "last bits"),
+    ("pipeline/b.cpp", "std::normal_distribution<double> x;\n", "last bits"),
     ("src/b.cpp", "int x;\n", "src/: not one of the folders"),
     ("tools/b.h", HEADER + "namespace qmpipe {\nstruct Post {\n  int x;\n};\n}\n",
      "tools/b.h:4: qmpipe::Post is defined in stages/names.h:5 too"),
