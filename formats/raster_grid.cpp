@@ -20,7 +20,13 @@ constexpr double kSamePlaceDeg = 1e-11;
 // million times as much, so that but for one place in a million they are gone, and it is small beside
 // the hundredth to which places between anchor posts are exact.
 constexpr double kSnapsPerPixel = 1024;
+// Where one number ends and the next begins: not at a half, on which posts of a grid that is made
+// for the tiling would lie one and all, each to be decided by its last bit.
+constexpr double kSnapFrom = 0.4871;
 constexpr double kSnapsPerDegree = 1e9;
+// A micrometre, as kSamePlaceDeg: an edge at a whole degree is not the next number's for its last
+// bit.
+constexpr double kSameSnap = 0.01;
 
 std::vector<MapPoint> sample_points(const GridInfo& info) {
   constexpr int kSteps = 8;
@@ -46,16 +52,20 @@ bool leaves_degrees_alone(const CrsTransform& transform, std::span<const MapPoin
 }
 
 PixelPoint snapped(const PixelPoint& p) {
-  return {.column = std::floor(p.column * kSnapsPerPixel + 0.5) / kSnapsPerPixel,
-          .row = std::floor(p.row * kSnapsPerPixel + 0.5) / kSnapsPerPixel};
+  return {.column = std::floor(p.column * kSnapsPerPixel + kSnapFrom) / kSnapsPerPixel,
+          .row = std::floor(p.row * kSnapsPerPixel + kSnapFrom) / kSnapsPerPixel};
 }
 
 // Outwards; whole degrees stay what they are.
 RectangleDeg widened(const RectangleDeg& bounds) {
-  return {.west_deg = std::floor(bounds.west_deg * kSnapsPerDegree) / kSnapsPerDegree,
-          .south_deg = std::floor(bounds.south_deg * kSnapsPerDegree) / kSnapsPerDegree,
-          .east_deg = std::ceil(bounds.east_deg * kSnapsPerDegree) / kSnapsPerDegree,
-          .north_deg = std::ceil(bounds.north_deg * kSnapsPerDegree) / kSnapsPerDegree};
+  const auto down = [](double deg) {
+    return std::floor(deg * kSnapsPerDegree + kSameSnap) / kSnapsPerDegree;
+  };
+  const auto up = [&down](double deg) { return -down(-deg); };
+  return {.west_deg = down(bounds.west_deg),
+          .south_deg = down(bounds.south_deg),
+          .east_deg = up(bounds.east_deg),
+          .north_deg = up(bounds.north_deg)};
 }
 
 // 0 where there is no turn.

@@ -9,8 +9,9 @@
 namespace qmpipe {
 namespace {
 
-// Below this the heights of float32 lattices and headers are coarser than the tolerance.
-constexpr double kSmallestToleranceM = 0.001;
+// Below this the heights of float32 lattices and headers are coarser than the tolerance. What the
+// default comes to at the deepest zoom, 0.9 mm, is above it.
+constexpr double kSmallestToleranceM = 0.0005;
 constexpr double kLargestToleranceM = 1e7;
 constexpr std::int32_t kMostThreads = 1024;
 

@@ -4,9 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "scheduler/elementary.h"
-
 #include "pipeline/svg.h"
+#include "scheduler/elementary.h"
 
 namespace qmpipe {
 namespace {

@@ -21,7 +21,7 @@ constexpr std::int64_t kMostParameterFileBytes = 1 << 20;
 
 // Defaults: Campos et al. 2020, Table 3, but for g_g (method.h says why).
 constexpr ParameterInfo kParameters[] = {
-    {"g_e", "tolerance: largest vertical error, metres", "15000/2", 0.001, 1e7, false},
+    {"g_e", "tolerance: largest vertical error, metres", "15000/2", 0.0005, 1e7, false},
     {"g_g", "cells a side of the initial grid", "0", 0, 256, true},
     {"e_e", "edges at which edge collapse stops", "5000,5000,5000,5000,1000", 5, 1e9, true},
     {"e_v", "weight of the volume in the cost", "0.5", 0, 1e6, false},

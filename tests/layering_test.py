@@ -3,9 +3,9 @@
 
 Checked: includes point one way (scheduler <- formats <- stages <- pipeline <- tools; tests and perf
 may include anything); each third-party library is included only where the table below allows it,
-and in no header of ours; no function of the C library whose last bits depend on the processor; every header opens with a comment and has #pragma once; a name that a
-header defines is defined nowhere else; no file is longer than 600 lines; no top-level folder that
-nobody agreed on.
+and in no header of ours; no function of the C library whose last bits depend on the processor;
+every header opens with a comment and has #pragma once; a name that a header defines is defined
+nowhere else; no file is longer than 600 lines; no top-level folder that nobody agreed on.
 
   layering_test.py [ROOT]       checks a tree, prints every violation, exits 1 when there is one
   layering_test.py --self-test  builds trees with one violation each and checks that it is found

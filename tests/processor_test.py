@@ -63,7 +63,7 @@ class Processor(unittest.TestCase):
             # The same name in the same place: it may stand in the output.
             out = self.root / kind / name
             out.parent.mkdir(exist_ok=True)
-            done = run(command, dem, "-o", out, *options, env=env)
+            done = run(*command, dem, "-o", out, *options, env=env)
             self.assertEqual(done.returncode, 0, done.stderr)
             made.append(bytes_of(out))
         self.assertEqual(made[0].keys(), made[1].keys())
@@ -75,25 +75,28 @@ class Processor(unittest.TestCase):
         write_dem(dem, 6.3, 43.7, 0.01)
         for method in METHODS:
             with self.subTest(method):
-                self.compare(method, "build", dem, "--source-crs", "EPSG:4326", "--method", method)
-        self.compare("mercator", "build", dem, "--source-crs", "EPSG:4326", "--scheme", "mercator")
+                self.compare(method, ("build",), dem, "--source-crs", "EPSG:4326",
+                             "--method", method)
+        self.compare("mercator", ("build",), dem, "--source-crs", "EPSG:4326",
+                     "--scheme", "mercator")
 
     def test_sets_of_projected_dems(self):
         for crs, west, south in (("EPSG:32632", 300000, 5000000), ("EPSG:3035", 4000000, 2700000),
                                  ("EPSG:3031", -60000, 900000)):
             dem = self.root / (crs[5:] + ".asc")
             write_dem(dem, west, south, 900)
-            methods = METHODS if crs == "EPSG:32632" else ("greedy",)
+            methods = ("greedy", "ps-hierarchy", "ps-wlop") if crs == "EPSG:32632" else ("greedy",)
             for method in methods:
                 with self.subTest(crs=crs, method=method):
-                    self.compare(crs[5:] + method, "build", dem, "--source-crs", crs, "--method",
+                    self.compare(crs[5:] + method, ("build",), dem, "--source-crs", crs, "--method",
                                  method)
 
     def test_one_tin_and_a_detail_increment_model(self):
         dem = self.root / "degrees.asc"
         write_dem(dem, 6.3, 43.7, 0.01)
-        self.compare("wlop.ply", "tin", dem, "--source-crs", "EPSG:4326", "--method", "ps-wlop",
-                     "--triangles", 900)
+        crs = ("--source-crs", "EPSG:4326")
+        self.compare("wlop.ply", ("tin",), dem, *crs, "--method", "ps-wlop", "--triangles", 900)
+        self.compare("model.h5", ("detail", "build"), dem, *crs)
 
 
 if __name__ == "__main__":

@@ -381,5 +381,38 @@ TEST(RasterSource, APointsPlaceDoesNotDependOnThePast) {
   EXPECT_EQ(first->row, later->row);
 }
 
+// PROJ's last bits depend on the processor: they must not reach a height, a list of tiles or
+// layer.json.
+TEST(RasterSource, PlacesInAProjectionHaveNoLastBits) {
+  const TemporaryFolder folder;
+  RasterFixture fixture{.width = 100, .height = 100};
+  fixture.crs = "EPSG:32631";
+  fixture.geotransform = {{440000, 30, 0, 4800000, 0, -30}};
+  const auto source = open_fixture(file_in(folder, "a.tif"), fixture);
+  for (int k = 0; k < 500; ++k) {
+    const auto at = source->pixel_at(2.26 + 1e-5 * k, 43.33 + 1.3e-5 * k);
+    ASSERT_TRUE(at);
+    ASSERT_EQ(std::floor(at->column * 1024), at->column * 1024);
+    ASSERT_EQ(std::floor(at->row * 1024), at->row * 1024);
+    const auto beside = source->pixel_at(2.26 + 1e-5 * k + 1e-9, 43.33 + 1.3e-5 * k);
+    ASSERT_NEAR(beside->column, at->column, 1.0 / 1024);
+  }
+}
+
+TEST(RasterSource, EdgesAtWholeDegreesAreToldAsSuch) {
+  const TemporaryFolder folder;
+  constexpr double kMetresPerDegree = 20037508.342789244 / 180;
+  for (int west_deg = -179; west_deg < 170; west_deg += 7) {
+    RasterFixture fixture{.width = 9, .height = 5};
+    fixture.crs = "EPSG:3857";
+    const double pixel_m = kMetresPerDegree;
+    fixture.geotransform = {{west_deg * kMetresPerDegree, pixel_m, 0, 0, 0, -pixel_m}};
+    const auto source = open_fixture(file_in(folder, "a.tif"), fixture);
+    ASSERT_EQ(source->info().bounds_deg.west_deg, west_deg);
+    ASSERT_EQ(source->info().bounds_deg.east_deg, west_deg + 9);
+    ASSERT_EQ(source->info().bounds_deg.north_deg, 0);
+  }
+}
+
 }  // namespace
 }  // namespace qmpipe::testing
