@@ -40,13 +40,13 @@ class Axis {
     if (scale_ == Scale::kLogarithmic) {
       const auto last = static_cast<int>(std::floor(high_));
       for (auto power = static_cast<int>(std::floor(low_)); power <= last; ++power) {
-        for (const double digit : {1.0, 2.0, 5.0})
-          add_within(digit * whole_power(10, power), ticks);
+        const double ten = whole_power(10, power);
+        for (const double digit : {1.0, 2.0, 5.0}) add_within(digit * ten, ticks);
       }
       return ticks;
     }
     const double raw = (high_ - low_) / 5;
-    const double power = whole_power(10, static_cast<int>(std::floor(decimal_logarithm(raw))));
+    const double power = whole_power(10.0, static_cast<int>(std::floor(decimal_logarithm(raw))));
     const double step = power * (raw / power < 1.5 ? 1 : raw / power < 3.5 ? 2 : 5);
     const auto last = static_cast<int>(std::floor(high_ / step));
     for (auto k = static_cast<int>(std::ceil(low_ / step)); k <= last; ++k) {

@@ -18,7 +18,7 @@ constexpr double kNeverHidden = 1e6;
 // The latitude and height of a point, from its distance to the axis and its z.
 struct Vertical {
   SinCos latitude;
-  double height_m;
+  double height_m = 0;
 };
 
 // B. R. Bowring, "Transformation from spatial to geographical coordinates" (1976): Newton's method
