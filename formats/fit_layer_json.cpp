@@ -89,6 +89,7 @@ class Fitter {
     fit_scheme();
     fit_tiles();
     if (!parsed_.metadata_availability) fit_available();
+    fit_bounds();
     fit_max_zoom();
     fit_extension("octvertexnormals", [](const QuantizedMesh& m) { return !m.normals.empty(); });
     fit_extension("watermask", [](const QuantizedMesh& m) { return !m.water_mask.empty(); });
@@ -168,9 +169,12 @@ class Fitter {
       // Numbers of 32 bits: the product is at most 2^64, so one factor is looked at alone.
       const auto room = static_cast<std::int64_t>(keys.size() - listed.size());
       if (wide > room || high > room || wide * high > room) return false;
-      for (std::int32_t x = range.start_x; x <= range.end_x; ++x) {
-        for (std::int32_t y = range.start_y; y <= range.end_y; ++y) {
-          listed.push_back({.zoom = keys.front().zoom, .x = x, .y = y});
+      // In 64 bits, so that the last number of 32 has a next one.
+      for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
+        for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+          listed.push_back({.zoom = keys.front().zoom,
+                            .x = static_cast<std::int32_t>(x),
+                            .y = static_cast<std::int32_t>(y)});
         }
       }
     }
@@ -205,9 +209,26 @@ class Fitter {
     change("\"available\" lists the tiles that are there");
   }
 
+  bool is_complained_of(const char* beginning) const {
+    return std::any_of(
+        parsed_.complaints.begin(), parsed_.complaints.end(),
+        [beginning](const std::string& text) { return text.starts_with(beginning); });
+  }
+
+  void fit_bounds() {
+    if (!is_complained_of("\"bounds\" are")) return;
+    json_.erase("bounds");
+    change("\"bounds\" is left out");
+  }
+
   void fit_max_zoom() {
     const auto deepest = static_cast<std::int32_t>(zooms_.size()) - 1;
-    if (parsed_.has_max_zoom && parsed_.layer.max_zoom >= deepest) return;
+    const bool is_wrong = is_complained_of("\"minzoom\"");
+    if (is_wrong) {
+      json_.erase("minzoom");
+      change("\"minzoom\" is left out");
+    }
+    if (!is_wrong && parsed_.has_max_zoom && parsed_.layer.max_zoom >= deepest) return;
     json_["maxzoom"] = std::max(deepest, 0);
     change(fmt::format("\"maxzoom\" is {}", std::max(deepest, 0)));
   }

@@ -179,6 +179,23 @@ class LayerParser {
                                 .south_deg = (*bounds)[1].get<double>(),
                                 .east_deg = (*bounds)[2].get<double>(),
                                 .north_deg = (*bounds)[3].get<double>()};
+    judge_bounds(parsed_.layer.bounds_deg);
+  }
+
+  // West may lie east of east: across the antimeridian.
+  void judge_bounds(const RectangleDeg& bounds) {
+    // Some programs write the edge of a raster, which lies a pixel's rounding beyond.
+    constexpr double kSlack = 1e-6;
+    const auto is_within = [](double value, double most) {
+      return std::abs(value) <= most + kSlack;
+    };
+    if (is_within(bounds.west_deg, 180) && is_within(bounds.east_deg, 180) &&
+        is_within(bounds.south_deg, 90) && is_within(bounds.north_deg, 90) &&
+        bounds.south_deg <= bounds.north_deg) {
+      return;
+    }
+    complain(fmt::format("\"bounds\" are {:g}, {:g}, {:g}, {:g}, which is no rectangle in degrees",
+                         bounds.west_deg, bounds.south_deg, bounds.east_deg, bounds.north_deg));
   }
 
   std::int32_t range_part(const Json& range, const char* key) {
@@ -239,6 +256,14 @@ class LayerParser {
     const Json* max_zoom = find("maxzoom");
     parsed_.has_max_zoom = max_zoom != nullptr;
     parsed_.layer.max_zoom = max_zoom != nullptr ? as_integer(*max_zoom, "maxzoom") : deepest;
+    // No tile of 32-bit numbers lies deeper.
+    constexpr std::int32_t kDeepest = 30;
+    const std::int32_t lowest = parsed_.layer.min_zoom;
+    const std::int32_t highest = parsed_.layer.max_zoom;
+    if (lowest < 0 || highest > kDeepest || (parsed_.has_max_zoom && lowest > highest)) {
+      complain(fmt::format("\"minzoom\" {} and \"maxzoom\" {} are no zooms that a set can have",
+                           lowest, highest));
+    }
     if (!parsed_.has_max_zoom) {
       complain("no \"maxzoom\": CesiumJS looks tiles up slowly without it");
     } else if (parsed_.layer.max_zoom < deepest) {
@@ -252,6 +277,10 @@ class LayerParser {
   void read_others() {
     if (const Json* levels = find("metadataAvailability")) {
       parsed_.metadata_availability = as_integer(*levels, "metadataAvailability");
+      if (*parsed_.metadata_availability > 30) {
+        complain(fmt::format("\"metadataAvailability\" is {}, more levels than there can be",
+                             *parsed_.metadata_availability));
+      }
     } else if (find("available") == nullptr) {
       complain("neither \"available\" nor \"metadataAvailability\": CesiumJS shows no tile");
     }

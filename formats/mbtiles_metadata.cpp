@@ -23,6 +23,11 @@ std::int32_t first_zoom(const RectangleDeg& bounds, const ZoomSpan& zooms) {
 void add_place(const RectangleDeg& bounds, const std::optional<ZoomSpan>& zooms, Rows& rows) {
   // Other programs' sets may have none.
   if (!(bounds.west_deg < bounds.east_deg) || !(bounds.south_deg < bounds.north_deg)) return;
+  // Or numbers that lie nowhere.
+  if (!(bounds.east_deg - bounds.west_deg <= 720) || !(std::abs(bounds.west_deg) <= 720) ||
+      !(std::abs(bounds.south_deg) <= 90) || !(std::abs(bounds.north_deg) <= 90)) {
+    return;
+  }
   rows.emplace_back("bounds", fmt::format("{},{},{},{}", bounds.west_deg, bounds.south_deg,
                                           bounds.east_deg, bounds.north_deg));
   if (!zooms) return;

@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "pipeline/check_texts.h"
+#include "pipeline/web_address.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
@@ -36,6 +37,9 @@ void CheckLog::add(CheckKind kind, CheckSubject subject, const std::string& url,
 }
 
 void CheckLog::add(CheckFinding finding) {
+  // Reports are shown and kept: whatever is in them passes here.
+  finding.url = without_credentials(finding.url);
+  finding.text = without_credentials(finding.text);
   // Tiles that suffer alike are told once; layer.json may have several faults of a kind.
   const auto is_equal = [&finding](const CheckFinding& other) {
     return other.kind == finding.kind && other.subject == finding.subject &&

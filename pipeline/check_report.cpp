@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "formats/printable.h"
 #include "pipeline/check_url.h"
 
 namespace qmpipe {
@@ -12,13 +13,6 @@ std::string counted(std::int64_t number, const char* noun) {
   return fmt::format("{} {}{}", number, noun, number == 1 ? "" : "s");
 }
 
-// Servers' words must not steer the terminal.
-std::string printable(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, '?');
-  return text;
-}
-
 // What viewers do, and the remedy, once for all findings of a kind.
 enum class Advice { kShown, kShownAfter };
 
@@ -26,8 +20,9 @@ std::string text_of_finding(const CheckFinding& finding, Advice advice) {
   const CheckKindText& about = text_of(finding.kind);
   const std::string more =
       finding.count > 1 ? fmt::format(" ({} answers, the first is this one)", finding.count) : "";
-  std::string text = fmt::format("{} {}: {}\n  at      {}{}\n", name_of(finding.severity),
-                                 about.name, printable(finding.text), printable(finding.url), more);
+  std::string text =
+      fmt::format("{} {}: {}\n  at      {}{}\n", name_of(finding.severity), about.name,
+                  printable_line(finding.text), printable_line(finding.url), more);
   if (advice == Advice::kShown) {
     text += fmt::format("  viewers {}\n  remedy  {}\n", about.viewer, about.remedy);
   }
@@ -50,7 +45,7 @@ std::string text_of(const CheckReport& report) {
     text +=
         text_of_finding(report.findings[k], is_last_of_kind ? Advice::kShown : Advice::kShownAfter);
   }
-  text += fmt::format("check: {}: {} of {} without a fault", printable(report.layer_url),
+  text += fmt::format("check: {}: {} of {} without a fault", printable_line(report.layer_url),
                       report.tiles_sound, counted(report.tiles_asked, "tile"));
   if (report.deepest_zoom > 0) text += fmt::format(", down to zoom {}", report.deepest_zoom);
   for (const CheckSeverity severity :

@@ -19,8 +19,8 @@ constexpr const char* kSomeOtherSite = "https://viewer.example";
 WebAddress understood(const char* what, const std::string& text) {
   Result<WebAddress> address = parse_web_address(text);
   if (!address) {
-    throw UsageError(
-        fmt::format("{}: {}; give it as in https://host/folder/", what, address.error().message));
+    throw UsageError(fmt::format("{}: {}; give it as in https://host/folder/", what,
+                                 without_credentials(address.error().message)));
   }
   return std::move(*address);
 }
@@ -38,7 +38,7 @@ class UrlCheck {
         options_(options),
         asker_({.page = asking_page(options.origin), .fetch = fetch}) {
     layer_address_.path += "layer.json";
-    report_.layer_url = layer_address_.text();
+    report_.layer_url = without_credentials(layer_address_.text());
   }
 
   CheckReport run() {

@@ -4,10 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "formats/printable.h"
 
 namespace qmpipe {
 namespace {
@@ -26,9 +30,23 @@ std::string fill_text(const BufferFill& fill) {
                            : fmt::format("{} {}", fill.name, fill.filled);
 }
 
-void write_stderr(const std::string& text) {
-  std::fwrite(text.data(), 1, text.size(), stderr);
+constexpr const char* kClearLine = "\r\033[K";
+
+// Past stdio, which may have been told to let no control sequence pass; what is not ours in `text` is
+// printable already. Nobody could be told that it cannot be written.
+void write_stderr(std::string_view text) {
   std::fflush(stderr);
+  while (!text.empty()) {
+    const ssize_t written = ::write(STDERR_FILENO, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+// A path need not be UTF-8.
+std::string line_of(const nlohmann::json& json) {
+  return printable(json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)) + "\n";
 }
 
 }  // namespace
@@ -70,9 +88,10 @@ void Progress::end() {
 void Progress::note(const std::string& text) {
   const std::scoped_lock lock(mutex_);
   if (style_ == ProgressStyle::kJsonLines) {
-    write_stderr(nlohmann::json{{"event", "note"}, {"text", text}}.dump() + "\n");
+    write_stderr(line_of({{"event", "note"}, {"text", text}}));
   } else {
-    write_stderr((lines_shown_ > 0 ? "\r\033[K" : "") + ("qmpipe: " + text + "\n"));
+    write_stderr((lines_shown_ > 0 ? kClearLine : "") +
+                 ("qmpipe: " + printable_message(text) + "\n"));
     lines_shown_ = 0;
   }
 }
@@ -80,7 +99,7 @@ void Progress::note(const std::string& text) {
 void Progress::event(const std::string& json_object) {
   if (style_ != ProgressStyle::kJsonLines) return;
   const std::scoped_lock lock(mutex_);
-  write_stderr(json_object + "\n");
+  write_stderr(printable(json_object) + "\n");
 }
 
 void Progress::check_stop() const {
@@ -115,7 +134,7 @@ void Progress::report(bool final) {
     for (const BufferFill& fill : fills) {
       line["buffers"][fill.name] = {{"filled", fill.filled}, {"capacity", fill.capacity}};
     }
-    write_stderr(line.dump() + "\n");
+    write_stderr(line_of(line));
     return;
   }
   if (style_ != ProgressStyle::kTerminal) return;

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 namespace qmpipe {
@@ -57,6 +59,9 @@ bool read_value(const json& value, bool& into) {
 }
 bool read_value(const json& value, std::int32_t& into) {
   if (!value.is_number_integer()) return false;
+  // A larger one would wrap into another.
+  const double number = value.get<double>();
+  if (std::abs(number) > std::numeric_limits<std::int32_t>::max()) return false;
   into = value.get<std::int32_t>();
   return true;
 }
@@ -210,6 +215,13 @@ Result<Recipe> parse_recipe(const std::string& text) {
   const auto zooms = static_cast<std::size_t>(recipe.max_zoom) + 1;
   if (recipe.tolerance_m.size() != zooms || recipe.height_step_m.size() != zooms) {
     return Error{"the recipe does not list one tolerance and one height step for each zoom"};
+  }
+  // Metres on Earth: 1e308 is a number too.
+  const auto is_length = [](double value) { return value >= 0 && value <= 1e7; };
+  for (const std::vector<double>* values : {&recipe.tolerance_m, &recipe.height_step_m}) {
+    if (!std::all_of(values->begin(), values->end(), is_length)) {
+      return Error{"a tolerance or height step of the recipe is no length on Earth"};
+    }
   }
   for (const auto& [name, values] : recipe.parameters) {
     if (values.size() != zooms) {

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "formats/errors.h"
+#include "formats/foreign_crs.h"
 #include "pipeline/recipe.h"
 #include "pipeline/verify_borders.h"
 #include "pipeline/verify_set.h"
@@ -108,6 +109,14 @@ void Verification::read_recipe() {
   if (!recipe) return refuse(recipe.error().message);
   if (recipe->projection != layer_.scheme.projection()) {
     return refuse("its scheme is not the one of \"projection\"");
+  }
+  // Somebody else's set: its text must not make requests or open files.
+  const std::string& crs = recipe->source_crs;
+  if (!options_.sources.empty() && options_.source_crs.empty() && !crs.empty()) {
+    if (const auto error = fault_of_foreign_crs(crs)) {
+      return refuse(fmt::format("its source_crs \"{}\" {}; say which CRS it is with --source-crs",
+                                crs.substr(0, 80), error->message));
+    }
   }
   recipe_ = std::move(*recipe);
 }

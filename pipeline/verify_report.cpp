@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/printable.h"
 #include "pipeline/text_table.h"
 #include "pipeline/verify.h"
 
@@ -63,7 +64,7 @@ std::string findings_text(const VerifyReport& report, const std::vector<Finding>
   std::array<std::int64_t, kFindingKinds> shown{};
   for (const Finding& finding : findings) {
     text += fmt::format("{} {} {}: {}\n", label, name_of(finding.kind), place_of(finding),
-                        finding.text);
+                        printable_line(finding.text));
     ++shown[static_cast<std::size_t>(finding.kind)];
   }
   for (std::size_t k = 0; k < kFindingKinds; ++k) {

@@ -117,6 +117,28 @@ Result<WebAddress> resolve(const WebAddress& folder, std::string_view reference)
   return resolved;
 }
 
+std::string without_credentials(std::string_view text) {
+  constexpr std::string_view kSeparators = " \t\r\n/\\\"'`<>";
+  std::string shown;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find_first_of(kSeparators), text.size());
+    std::string_view word = text.substr(0, end);
+    const std::size_t at = word.rfind('@');
+    // "user:pass@host" is a secret without a scheme before it as well.
+    if (at != std::string_view::npos &&
+        (shown.ends_with("//") || word.substr(0, at).find(':') != std::string_view::npos)) {
+      shown += "***";
+      word.remove_prefix(at);
+    }
+    shown += word;
+    text.remove_prefix(end);
+    if (text.empty()) break;
+    shown += text.front();
+    text.remove_prefix(1);
+  }
+  return shown;
+}
+
 std::string fill_template(std::string_view url_template, const TemplateValues& values) {
   std::string text;
   while (!url_template.empty()) {

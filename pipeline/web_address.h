@@ -34,6 +34,9 @@ WebAddress folder_of(WebAddress address);
 // Refuses what leads to another scheme than http and https. REQUIRES: the folder's path ends in '/'.
 Result<WebAddress> resolve(const WebAddress& folder, std::string_view reference);
 
+// A text with addresses in it, for messages: "https://user:pass@host" as "https://***@host".
+std::string without_credentials(std::string_view text);
+
 // What `{z}`, `{x}`, `{y}` and `{version}` stand for; an empty version leaves its placeholder.
 struct TemplateValues {
   TileKey key;  // y as it is to be written

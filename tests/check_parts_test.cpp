@@ -18,6 +18,21 @@
 namespace qmpipe {
 namespace {
 
+TEST(WebAddress, CredentialsAreNotShown) {
+  EXPECT_EQ(without_credentials("https://user:pass@host/a"), "https://***@host/a");
+  EXPECT_EQ(without_credentials("redirected to \"http://user@host:81/?q=1\""),
+            "redirected to \"http://***@host:81/?q=1\"");
+  EXPECT_EQ(without_credentials("https://u:p@ss@host, https://a:b@c"),
+            "https://***@host, https://***@c");
+  EXPECT_EQ(without_credentials("user:pass@host/terrain is no address"),
+            "***@host/terrain is no address");
+  EXPECT_EQ(without_credentials("//u:p@h"), "//***@h");
+  for (const char* text :
+       {"https://host/{z}/{x}@2x.terrain", "mail a@b.org", "", "https://host/"}) {
+    EXPECT_EQ(without_credentials(text), text);
+  }
+}
+
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::MatchesRegex;

@@ -78,8 +78,9 @@ class ProgressLine {
     const std::int64_t percent = 100 * done / all;
     if (!is_terminal_ || percent == shown_) return;
     shown_ = percent;
-    fmt::print(stderr, "\rsynth {:3} %", percent);
-    std::fflush(stderr);
+    // Past stdio, which lets no control character pass.
+    const std::string text = fmt::format("\rsynth {:3} %", percent);
+    static_cast<void>(::write(STDERR_FILENO, text.data(), text.size()) < 0);
   }
 
  private:

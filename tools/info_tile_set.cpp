@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "formats/layer_json.h"
+#include "formats/printable.h"
 #include "formats/tile_set.h"
 #include "tools/info_report.h"
 
@@ -113,7 +114,7 @@ const char* crs_of(Projection projection) {
 void print_layer(const ParsedLayerJson& parsed) {
   const LayerJson& layer = parsed.layer;
   const auto line = [](const char* name, const std::string& value) {
-    if (!value.empty()) fmt::print("{:<13}{}\n", name, value);
+    if (!value.empty()) fmt::print("{:<13}{}\n", name, printable_line(value));
   };
   line("name", layer.name);
   line("description", layer.description);
@@ -126,8 +127,8 @@ void print_layer(const ParsedLayerJson& parsed) {
        layer.extensions.empty() ? "none" : fmt::format("{}", fmt::join(layer.extensions, " ")));
   line("zooms", fmt::format("{} to {}", layer.min_zoom, layer.max_zoom));
   const RectangleDeg& bounds = layer.bounds_deg;
-  line("bounds", fmt::format("west {} south {} east {} north {} degrees", bounds.west_deg,
-                             bounds.south_deg, bounds.east_deg, bounds.north_deg));
+  line("bounds", fmt::format("west {:.10g} south {:.10g} east {:.10g} north {:.10g} degrees",
+                             bounds.west_deg, bounds.south_deg, bounds.east_deg, bounds.north_deg));
 }
 
 void print_table(const TileSetFacts& facts) {
@@ -141,12 +142,13 @@ void print_table(const TileSetFacts& facts) {
 }
 
 void print_text(const std::filesystem::path& path, const TileSetFacts& facts) {
-  fmt::print("{:<13}{}\n", "tile set", path.string());
+  fmt::print("{:<13}{}\n", "tile set", printable_line(path.string()));
   if (facts.layer) print_layer(*facts.layer);
   print_table(facts);
   if (facts.complaints.empty()) return;
   fmt::print("\ncomplaints\n");
-  for (const std::string& complaint : facts.complaints) fmt::print("  {}\n", complaint);
+  for (const std::string& complaint : facts.complaints)
+    fmt::print("  {}\n", printable_line(complaint));
 }
 
 using Json = nlohmann::ordered_json;

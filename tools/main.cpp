@@ -4,9 +4,11 @@
 #include <cstdio>
 #include <functional>
 #include <new>
+#include <sstream>
 #include <string>
 
 #include "formats/errors.h"
+#include "formats/printable.h"
 #include "pipeline/progress.h"
 #include "pipeline/version.h"
 #include "tools/command_build.h"
@@ -20,6 +22,7 @@
 #include "tools/command_synth.h"
 #include "tools/command_tin.h"
 #include "tools/command_verify.h"
+#include "tools/printed_streams.h"
 
 namespace {
 
@@ -29,7 +32,7 @@ constexpr int kInterrupted = 130;
 
 int fail(int code, const std::string& message) {
   std::fflush(stdout);
-  std::fputs(("qmpipe: " + message + "\n").c_str(), stderr);
+  std::fputs(("qmpipe: " + qmpipe::printable_message(message) + "\n").c_str(), stderr);
   return code;
 }
 
@@ -56,8 +59,14 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    // CLI11 counts help and version as "errors" with exit code 0.
-    return app.exit(error) == 0 ? 0 : kUsage;
+    // CLI11 counts help and version as "errors" with exit code 0. What it prints itself would not
+    // pass our streams.
+    std::ostringstream out;
+    std::ostringstream complaint;
+    const int code = app.exit(error, out, complaint);
+    std::fputs(out.str().c_str(), stdout);
+    std::fputs(complaint.str().c_str(), stderr);
+    return code == 0 ? 0 : kUsage;
   }
   return action();
 }
@@ -65,6 +74,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const qmpipe::PrintedStreams printed;
   try {
     return run(argc, argv);
   } catch (const qmpipe::UsageError& error) {

@@ -1,0 +1,26 @@
+// What the program prints, made harmless at the one place that all of it passes (formats/printable.h),
+// whoever prints it and whatever it says.
+#pragma once
+
+#include <cstdio>
+#include <memory>
+
+namespace qmpipe {
+
+// While it lives, stdout and stderr are streams that pass everything through a PrintableFilter, and
+// fail where the ones behind them do. The program's own control sequences go to the file descriptor
+// (pipeline/progress.h). One at a time; made before and destroyed after all threads that print.
+class PrintedStreams {
+ public:
+  PrintedStreams();
+  ~PrintedStreams();
+  PrintedStreams(const PrintedStreams&) = delete;
+  PrintedStreams& operator=(const PrintedStreams&) = delete;
+
+ private:
+  struct Stream;
+  std::unique_ptr<Stream> out_;
+  std::unique_ptr<Stream> err_;
+};
+
+}  // namespace qmpipe
