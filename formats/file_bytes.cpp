@@ -140,6 +140,10 @@ std::string remedy_for_errno(int error_number) {
     case EISDIR:
     case EEXIST:
       return "A file stands where a folder is wanted, or the other way round; choose another path.";
+    case ENAMETOOLONG:
+      return "Choose a shorter name: most file systems hold 255 bytes in one, of which some are "
+             "for "
+             "the name while it is written.";
     case EMFILE:
     case ENFILE:
       return "Raise the limit on open files (ulimit -n).";

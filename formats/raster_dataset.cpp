@@ -42,6 +42,19 @@ bool is_sidecar(const std::string& name) {
          std::find(kSidecars.begin(), kSidecars.end(), extension) != kSidecars.end();
 }
 
+// GDAL would wait for a pipe that nobody writes to, and cannot go back in one that somebody does.
+void require_no_stream(const std::string& path) {
+  std::error_code code;
+  const std::filesystem::file_type type = std::filesystem::status(path, code).type();
+  if (type != std::filesystem::file_type::fifo && type != std::filesystem::file_type::socket &&
+      type != std::filesystem::file_type::character) {
+    return;
+  }
+  throw IoError("cannot open the raster", path,
+                "it is a pipe or a device, and rasters are read here and there",
+                "Write it to a file first: cat PIPE > dem.tif");
+}
+
 OpenedRaster open_in_archive(const std::string& path) {
   GdalSession session;
   const std::string root = "/vsizip/" + path;
@@ -100,6 +113,7 @@ void CloseDataset::operator()(GDALDataset* dataset) const {
 }
 
 OpenedRaster open_dataset(const std::string& path) {
+  require_no_stream(path);
   GdalSession session;
   OpenedRaster opened{.dataset = try_open(path), .name = path, .assumptions = {}};
   VSIStatBufL status;

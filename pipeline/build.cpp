@@ -45,6 +45,16 @@ SurveyOptions survey_options(const BuildOptions& options) {
           .open_sources = sources_open_at_once(options.run.threads)};
 }
 
+// Before anything is made on disk: where nobody names the deepest zoom, the pixels decide it.
+void require_a_zoom(const BuildOptions& options, std::int32_t deepest_zoom) {
+  const std::int32_t min_zoom = options.mesh.min_zoom;
+  if (min_zoom <= deepest_zoom) return;
+  throw UsageError(fmt::format(
+      "--min-zoom {} is deeper than the deepest zoom, which is {} for pixels of this size; give "
+      "--min-zoom {} or less, or --max-zoom {} to interpolate between the pixels",
+      min_zoom, deepest_zoom, deepest_zoom, min_zoom));
+}
+
 // Tells what the sources leave open, so that a wrong guess does not go unnoticed.
 void note_assumptions(const std::vector<RasterInfo>& sources, Progress& progress) {
   bool any_datum = true;
@@ -277,6 +287,7 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
     result.found = std::move(set);
     return result;
   }
+  require_a_zoom(options, options.mesh.max_zoom.value_or(chosen_sampling_zoom(to_survey, sources)));
   note_assumptions(sources, progress);
   // Refuses what cannot work before anything is made on disk.
   share_memory(memory_request(options), to_survey, sources);

@@ -39,8 +39,9 @@ std::vector<std::string> violated_rules(const BuildOptions& options) {
           fmt::format("--min-zoom must be 0..{}", kMaxZoom));
   require(!mesh.max_zoom || (*mesh.max_zoom >= 0 && *mesh.max_zoom <= kMaxZoom),
           fmt::format("--max-zoom must be 0..{}", kMaxZoom));
-  require(!mesh.max_zoom || *mesh.max_zoom >= mesh.min_zoom,
-          "--max-zoom must not be less than --min-zoom");
+  require(mesh.max_zoom.value_or(-1) < 0 || *mesh.max_zoom >= mesh.min_zoom,
+          fmt::format("--min-zoom {} is deeper than --max-zoom {}; give --min-zoom {} or less",
+                      mesh.min_zoom, mesh.max_zoom.value_or(0), mesh.max_zoom.value_or(0)));
   for (const auto& [zoom, tolerance_m] : mesh.tolerance_at_m) {
     require(zoom >= 0 && zoom <= kMaxZoom && is_tolerance(tolerance_m),
             fmt::format("--tolerance-at {}={}: the zoom must be 0..{}, the tolerance {}..{} metres",

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/printable.h"
 #include "pipeline/diff_sets.h"
 #include "pipeline/text_table.h"
 
@@ -96,12 +97,14 @@ std::string text_of(const DiffReport& report) {
   if (report.zooms.size() > 1) rows.push_back(row_of("all", report.total));
   std::string text = table_text(rows);
   for (const LayerDifference& layer : report.layer) {
-    text += fmt::format("layer.json {}: {} / {}\n", layer.key, layer.a, layer.b);
+    text += fmt::format("layer.json {}: {} / {}\n", printable_line(layer.key),
+                        printable_line(layer.a), printable_line(layer.b));
   }
   text += listed(report.only_in_a, "A", report.total.only_in_a);
   text += listed(report.only_in_b, "B", report.total.only_in_b);
   for (const TileDifference& tile : report.worst) {
-    text += fmt::format("different {}: {}\n", to_string(tile.key), joined_parts(tile.parts));
+    text += fmt::format("different {}: {}\n", to_string(tile.key),
+                        printable_line(joined_parts(tile.parts)));
   }
   text += not_shown(report.total.different, report.worst.size(), "different");
   return text + summary_of(report);

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "formats/printable.h"
 #include "pipeline/build.h"
 #include "tools/interrupt.h"
 #include "tools/method_arguments.h"
@@ -102,7 +103,7 @@ int run_build(const BuildArguments& arguments) {
                "source: {}\n"
                "built: {} tiles, {} in {} (survey {:.1f} s, mesh {:.1f} s, peak memory {})\n",
                source_reads_text(result.report.source_reads), result.report.tiles,
-               bytes_text(result.report.stored_bytes), options.output.path.string(),
+               bytes_text(result.report.stored_bytes), printable_line(options.output.path.string()),
                result.report.survey_s, result.report.mesh_s,
                bytes_text(result.report.peak_resident_bytes));
   }

@@ -12,6 +12,7 @@
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/folders.h"
+#include "formats/printable.h"
 #include "pipeline/compare.h"
 #include "pipeline/compare_page.h"
 #include "pipeline/compare_tables.h"
@@ -128,10 +129,10 @@ int run_compare(const CompareArguments& arguments) {
   std::int64_t faults = 0;
   for (const ComparedMethod& method : comparison.methods) faults += method.verify.fault_count;
   const std::string text =
-      arguments.json
-          ? comparison_json(comparison)
-          : zooms_csv(comparison) + "\n" + run_times_csv(comparison) +
-                fmt::format("\nreport: {}\n", (arguments.report / "index.html").string());
+      arguments.json ? comparison_json(comparison)
+                     : zooms_csv(comparison) + "\n" + run_times_csv(comparison) +
+                           fmt::format("\nreport: {}\n",
+                                       printable_line((arguments.report / "index.html").string()));
   std::fputs(text.c_str(), stdout);
   return faults == 0 ? 0 : kExitFaults;
 }

@@ -17,6 +17,7 @@
 
 #include "formats/errors.h"
 #include "formats/mbtiles.h"
+#include "formats/printable.h"
 #include "formats/tile_set.h"
 #include "pipeline/convert.h"
 #include "pipeline/progress.h"
@@ -141,7 +142,8 @@ int run_convert(const ConvertArguments& arguments) {
       arguments.wants_json
           ? json_of(report, options)
           : fmt::format("converted: {} tiles, {} bytes read, {} written, into {}\n", report.tiles,
-                        report.read_bytes, report.written_bytes, options.output.string());
+                        report.read_bytes, report.written_bytes,
+                        printable_line(options.output.string()));
   std::fwrite(text.data(), 1, text.size(), stdout);
   return 0;
 }

@@ -12,10 +12,12 @@
 #include "formats/detail_file.h"
 #include "formats/errors.h"
 #include "formats/folders.h"
+#include "formats/printable.h"
 #include "pipeline/detail_build.h"
 #include "pipeline/process_memory.h"
 #include "tools/detail_commands.h"
 #include "tools/interrupt.h"
+#include "tools/number_options.h"
 
 namespace qmpipe {
 namespace {
@@ -61,8 +63,8 @@ void print_text(const BuildArguments& arguments, const DetailBuilt& built,
     fmt::print("{:<12}{}\n", name, value);
   };
   line("model",
-       fmt::format("{}, {} bytes, {:.2f} a triangle of the finest mesh", arguments.output,
-                   file_bytes,
+       fmt::format("{}, {} bytes, {:.2f} a triangle of the finest mesh",
+                   printable_line(arguments.output), file_bytes,
                    static_cast<double>(file_bytes) /
                        static_cast<double>(std::max<std::int64_t>(1, report.finest_triangles))));
   line("points", fmt::format("{}, {} left out{}", report.points, report.left_out,
@@ -164,14 +166,14 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
       ->add_option("--thin", options.points.thin_m,
                    "Keep one point of each square of so many metres, the one nearest to its centre "
                    "(points only; 0: all)")
-      ->check(CLI::NonNegativeNumber)
+      ->check(fault_of_negative)
       ->type_name("M");
   command
       ->add_option(
           "--outliers", options.points.outlier_m,
           "Leave out a point so many metres above or below all others around it (points only; "
           "0: none, for a mast or a sharp peak is such a point too)")
-      ->check(CLI::NonNegativeNumber)
+      ->check(fault_of_negative)
       ->type_name("M");
   command
       ->add_option("--source-crs", options.points.source_crs,

@@ -10,8 +10,10 @@
 
 #include "formats/errors.h"
 #include "formats/mesh_export.h"
+#include "formats/printable.h"
 #include "pipeline/detail_extract.h"
 #include "tools/detail_commands.h"
+#include "tools/number_options.h"
 #include "tools/parse_values.h"
 
 namespace qmpipe {
@@ -84,8 +86,8 @@ void make_local(ExportMesh& mesh) {
 
 void print_text(const DetailModel& model, const DetailLevels& levels, const ExportMesh& mesh,
                 const ExtractArguments& arguments) {
-  fmt::print("{}: {} triangles, {} vertices\n", arguments.output, mesh.indices.size() / 3,
-             mesh.positions_m.size());
+  fmt::print("{}: {} triangles, {} vertices\n", printable_line(arguments.output),
+             mesh.indices.size() / 3, mesh.positions_m.size());
   fmt::print("{:>6} {:>12} {:>12} {:>12} {:>14}\n", "block", "level", "of", "svo m", "triangles");
   for (std::size_t b = 0; b < levels.size(); ++b) {
     const DetailBlock& block = model.blocks[b];
@@ -138,16 +140,16 @@ int run_extract(const ExtractArguments& arguments) {
 
 void add_choices(CLI::App& command, ExtractArguments& arguments) {
   command.add_option("--svo", arguments.svo_m, "Smallest visible object, metres")
-      ->check(CLI::NonNegativeNumber)
+      ->check(fault_of_negative)
       ->type_name("D");
   command.add_option("--triangles", arguments.triangles, "Triangles at most")
-      ->check(CLI::PositiveNumber)
+      ->check(fault_of_not_positive)
       ->type_name("N");
   command.add_option("--level", arguments.level, "Level; 0 is the coarsest")
-      ->check(CLI::NonNegativeNumber)
+      ->check(fault_of_negative)
       ->type_name("L");
   command.add_option("--distance", arguments.distance_m, "Distance of the eye, metres")
-      ->check(CLI::NonNegativeNumber)
+      ->check(fault_of_negative)
       ->type_name("R");
   command.add_option("--eye", arguments.eye_m, "Where the eye is, metres, as --frame crs has them")
       ->delimiter(',')
@@ -164,11 +166,11 @@ void add_view_options(CLI::App& command, DetailView& view) {
       ->capture_default_str()
       ->type_name("F");
   command.add_option("--screen", view.screen_height, "Height of the screen, pixels")
-      ->check(CLI::PositiveNumber)
+      ->check(fault_of_not_positive)
       ->capture_default_str()
       ->type_name("H");
   command.add_option("--pixels", view.pixels, "Length of the smallest visible object, pixels")
-      ->check(CLI::PositiveNumber)
+      ->check(fault_of_not_positive)
       ->capture_default_str()
       ->type_name("P");
 }

@@ -11,6 +11,7 @@
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
+#include "formats/printable.h"
 #include "pipeline/detail_chart.h"
 #include "pipeline/detail_extract.h"
 #include "pipeline/detail_increments.h"
@@ -70,9 +71,9 @@ Json block_json(const DetailBlock& block) {
 
 void print_info(const InfoArguments& arguments, const DetailModel& model) {
   std::error_code code;
-  fmt::print("{}: {} bytes, {} blocks, {} triangles in seams, interval {}\n", arguments.path,
-             std::filesystem::file_size(arguments.path, code), model.blocks.size(),
-             model.seams.size(), model.interval);
+  fmt::print("{}: {} bytes, {} blocks, {} triangles in seams, interval {}\n",
+             printable_line(arguments.path), std::filesystem::file_size(arguments.path, code),
+             model.blocks.size(), model.seams.size(), model.interval);
   const DetailFrame& frame = model.frame;
   fmt::print("steps {:g} x {:g} x {:g} m from {:.3f} {:.3f} {:.3f}\n", frame.step_m[0],
              frame.step_m[1], frame.step_m[2], frame.offset[0], frame.offset[1], frame.offset[2]);

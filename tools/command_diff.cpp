@@ -13,6 +13,7 @@
 #include "pipeline/diff_sets.h"
 #include "pipeline/progress.h"
 #include "tools/interrupt.h"
+#include "tools/number_options.h"
 
 namespace qmpipe {
 namespace {
@@ -72,7 +73,7 @@ void register_diff(CLI::App& app, std::function<int()>& action) {
       ->add_option("--max", options.most_listed,
                    "Tiles of each kind to show (different, only in A, only in B); all are counted")
       ->type_name("N")
-      ->check(CLI::NonNegativeNumber)
+      ->check(fault_of_negative)
       ->capture_default_str();
   command->add_flag("--json", arguments->wants_json, "Write one JSON object instead of a table");
   command->callback(

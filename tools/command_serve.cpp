@@ -15,12 +15,14 @@
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
+#include "formats/printable.h"
 #include "formats/tile_set.h"
 #include "tools/detail_commands.h"
 #include "tools/detail_service.h"
 #include "tools/http_server.h"
 #include "tools/interrupt.h"
 #include "tools/page_files.h"
+#include "tools/printed_streams.h"
 #include "tools/tile_service.h"
 
 namespace qmpipe {
@@ -69,10 +71,11 @@ std::string greeting(const ServeArguments& arguments, const TileService& service
                                            {"layer_changes", service.layer_changes()}};
     return object.dump() + "\n";
   }
-  std::string text = fmt::format("{}: {} tiles, down to zoom {}\n", arguments.path, service.tiles(),
-                                 service.deepest_zoom());
+  std::string text = fmt::format("{}: {} tiles, down to zoom {}\n", printable_line(arguments.path),
+                                 service.tiles(), service.deepest_zoom());
   for (const std::string& change : service.layer_changes()) {
-    text += fmt::format("  layer.json does not fit the tiles; as it is served, {}\n", change);
+    text += fmt::format("  layer.json does not fit the tiles; as it is served, {}\n",
+                        printable_line(change));
   }
   text += fmt::format("  to look at it   {}\n  terrain         {}tiles\n", address, address);
   if (!pages.has_cesium()) {
@@ -94,7 +97,7 @@ std::string greeting(const ServeArguments& arguments, const DetailService& servi
     return object.dump() + "\n";
   }
   std::string text = fmt::format("{}: {} to {} triangles in {} blocks\n  to look at it   {}\n",
-                                 arguments.path, service.coarsest_triangles(),
+                                 printable_line(arguments.path), service.coarsest_triangles(),
                                  service.finest_triangles(), service.blocks(), address);
   if (!pages.has_three()) {
     text += "  three.js is not installed, so the page stays empty: run tools/setup.sh\n";
@@ -115,7 +118,7 @@ int serve(const ServeArguments& arguments, const Service& service, const char* s
   });
   const std::string text = greeting(arguments, service, pages, server.port());
   std::fputs(text.c_str(), stdout);
-  std::fflush(stdout);
+  require_printed();
   server.run(stop);
   return 0;
 }

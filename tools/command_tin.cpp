@@ -11,6 +11,7 @@
 
 #include "formats/errors.h"
 #include "formats/folders.h"
+#include "formats/printable.h"
 #include "pipeline/process_memory.h"
 #include "pipeline/single_tin.h"
 #include "pipeline/stopwatch.h"
@@ -143,7 +144,7 @@ void print_text(const SingleTinOptions& options, const SingleTin& single, const 
   };
   std::string values;
   for (const auto& [name, value] : result.values) values += fmt::format(" {}={:g}", name, value);
-  line("mesh", fmt::format("{}, {} bytes", written.path, written.bytes));
+  line("mesh", fmt::format("{}, {} bytes", printable_line(written.path), written.bytes));
   line("DEM", fmt::format("{} x {} posts, {:.4g} x {:.4g} m apart, {:g} to {:g} m high",
                           dem.grid.width_posts, dem.grid.height_posts, post_spacing(dem.info).x_m,
                           post_spacing(dem.info).y_m, dem.low_m, dem.high_m));
@@ -212,7 +213,8 @@ int run_tin(const TinArguments& arguments) {
   if (arguments.verbose) print_effective(arguments, options);
   const SingleTin single = make_single_tin(options);
   for (const std::string& assumption : single.dem.info.assumptions) {
-    fmt::print(stderr, "qmpipe: {}: {}\n", single.dem.info.path, assumption);
+    fmt::print(stderr, "qmpipe: {}: {}\n", printable_line(single.dem.info.path),
+               printable_line(assumption));
   }
   const Stopwatch watch;
   write_mesh_file(arguments.output, mesh_of(single, frame));

@@ -13,6 +13,7 @@
 #include "pipeline/progress.h"
 #include "pipeline/verify.h"
 #include "tools/interrupt.h"
+#include "tools/number_options.h"
 
 namespace qmpipe {
 namespace {
@@ -97,7 +98,7 @@ void register_verify(CLI::App& app, std::function<int()>& action) {
       ->add_option("--max-faults", options.most_per_kind,
                    "Faults and warnings of each kind to show; all are counted")
       ->type_name("N")
-      ->check(CLI::NonNegativeNumber)
+      ->check(fault_of_negative)
       ->capture_default_str();
   command->add_flag("--json", arguments->wants_json, "Write one JSON object instead of a table");
   command->callback(

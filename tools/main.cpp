@@ -1,11 +1,17 @@
 // The program's one entry: parses, runs the command, and turns every error into a message and an
 // exit code (0 done, 1 failed, 2 usage, 3 faults or differences found, 130 interrupted).
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <atomic>
 #include <cstdio>
+#include <cstdlib>
+#include <exception>
 #include <functional>
 #include <new>
 #include <sstream>
 #include <string>
+#include <string_view>
 
 #include "formats/errors.h"
 #include "formats/printable.h"
@@ -22,6 +28,7 @@
 #include "tools/command_synth.h"
 #include "tools/command_tin.h"
 #include "tools/command_verify.h"
+#include "tools/number_options.h"
 #include "tools/printed_streams.h"
 
 namespace {
@@ -34,6 +41,36 @@ int fail(int code, const std::string& message) {
   std::fflush(stdout);
   std::fputs(("qmpipe: " + qmpipe::printable_message(message) + "\n").c_str(), stderr);
   return code;
+}
+
+// Nothing is allocated, for there may be nothing left.
+void write_to_terminal(std::string_view text) {
+  for (const char c : text) {
+    const char shown = c == '\n' || (c >= ' ' && c <= '~') ? c : '?';
+    if (::write(STDERR_FILENO, &shown, 1) < 0) return;
+  }
+}
+
+// Where a library cannot throw any further, as when TBB gets no more threads: the run ends like one
+// that was killed, which the same command goes on with, but says why.
+[[noreturn]] void end_with_a_message() {
+  static std::atomic_flag is_ending = ATOMIC_FLAG_INIT;
+  // Another thread is at it, and will end this one.
+  while (is_ending.test_and_set()) ::pause();
+  write_to_terminal("qmpipe: ");
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+    write_to_terminal("an error that nobody could handle");
+  } catch (const std::exception& error) {
+    write_to_terminal(error.what());
+  } catch (...) {
+    write_to_terminal("an error of a kind that nobody knows");
+  }
+  write_to_terminal(
+      "\n  Where the system gives no more memory or threads: give less to do at a time (--threads "
+      "1),"
+      "\n  or raise its limits (ulimit -v, ulimit -u).\n");
+  std::_Exit(kFailed);
 }
 
 int run(int argc, char** argv) {
@@ -56,6 +93,7 @@ int run(int argc, char** argv) {
   qmpipe::register_detail(app, action);
   qmpipe::register_tin(app, action);
   qmpipe::register_synth(app, action);
+  qmpipe::read_decimal_numbers_only(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -65,16 +103,21 @@ int run(int argc, char** argv) {
     std::ostringstream complaint;
     const int code = app.exit(error, out, complaint);
     std::fputs(out.str().c_str(), stdout);
-    std::fputs(complaint.str().c_str(), stderr);
-    return code == 0 ? 0 : kUsage;
+    std::fputs(qmpipe::printable_message(complaint.str()).c_str(), stderr);
+    if (code != 0) return kUsage;
+    qmpipe::require_printed();
+    return 0;
   }
-  return action();
+  const int code = action();
+  qmpipe::require_printed();
+  return code;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   const qmpipe::PrintedStreams printed;
+  std::set_terminate(end_with_a_message);
   try {
     return run(argc, argv);
   } catch (const qmpipe::UsageError& error) {

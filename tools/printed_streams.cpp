@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <string>
 
+#include "formats/errors.h"
 #include "formats/printable.h"
 
 namespace qmpipe {
@@ -21,6 +22,14 @@ bool write_all(int descriptor, std::string_view text) {
 }
 
 }  // namespace
+
+void require_printed() {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
+  // Flushed again, it would only fail again.
+  std::clearerr(stdout);
+  throw IoError("cannot write to", "the standard output", "what was printed is not complete",
+                "Free some space on its disk, or send it somewhere else.");
+}
 
 struct PrintedStreams::Stream {
   int descriptor;
@@ -57,13 +66,15 @@ PrintedStreams::PrintedStreams()
     : out_(std::make_unique<Stream>(STDOUT_FILENO)), err_(std::make_unique<Stream>(STDERR_FILENO)) {
   std::fflush(stdout);
   std::fflush(stderr);
-  std::swap(stdout, out_->file);
-  std::swap(stderr, err_->file);
+  swap_streams();
 }
 
-PrintedStreams::~PrintedStreams() {
-  std::swap(stdout, out_->file);
-  std::swap(stderr, err_->file);
+PrintedStreams::~PrintedStreams() { swap_streams(); }
+
+// One that could not be made leaves the system's in its place.
+void PrintedStreams::swap_streams() {
+  if (out_->file != nullptr) std::swap(stdout, out_->file);
+  if (err_->file != nullptr) std::swap(stderr, err_->file);
 }
 
 }  // namespace qmpipe

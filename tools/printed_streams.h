@@ -7,6 +7,10 @@
 
 namespace qmpipe {
 
+// For the end of a command: all that was printed to stdout is out. Throws IoError where it is not:
+// who reads a report that is cut off must not be told that all went well.
+void require_printed();
+
 // While it lives, stdout and stderr are streams that pass everything through a PrintableFilter, and
 // fail where the ones behind them do. The program's own control sequences go to the file descriptor
 // (pipeline/progress.h). One at a time; made before and destroyed after all threads that print.
@@ -19,6 +23,7 @@ class PrintedStreams {
 
  private:
   struct Stream;
+  void swap_streams();
   std::unique_ptr<Stream> out_;
   std::unique_ptr<Stream> err_;
 };

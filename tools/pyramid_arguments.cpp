@@ -47,10 +47,9 @@ void add_mesh_options(CLI::App& command, PyramidArguments& arguments) {
       ->check(CLI::IsMember({"geodetic", "mercator"}));
   command.add_option("--min-zoom", mesh.min_zoom, "Coarsest zoom (above 0: a set without roots)")
       ->capture_default_str();
-  command
-      .add_option("--max-zoom", arguments.max_zoom,
-                  "Deepest zoom (default: the coarsest whose posts are no wider apart than pixels)")
-      ->check(CLI::NonNegativeNumber);
+  command.add_option(
+      "--max-zoom", arguments.max_zoom,
+      "Deepest zoom (default: the coarsest whose posts are no wider apart than pixels)");
   command
       .add_option(
           "--tolerance", arguments.tolerance_m,
@@ -97,7 +96,7 @@ BuildOptions to_build_options(const PyramidArguments& arguments) {
   options.mesh.reduction = understood("--reduce", reduction_named(arguments.reduction));
   options.mesh.voids = understood("--nodata", void_policy_named(arguments.voids));
   options.mesh.tolerance_at_m = parse_tolerances(arguments.tolerances);
-  if (arguments.max_zoom >= 0) options.mesh.max_zoom = arguments.max_zoom;
+  options.mesh.max_zoom = arguments.max_zoom;
   options.run.memory_bytes = parse_size("--memory", arguments.memory);
   return options;
 }

@@ -23,8 +23,9 @@ struct PyramidArguments {
   std::string voids = "pull";
   std::string memory = "0";
   std::string tolerances;
-  std::int32_t max_zoom = -1;
-  // Shorter words for parameters; null until they are given.
+  // Null until they are given.
+  std::optional<std::int32_t> max_zoom;
+  // Shorter words for parameters.
   std::optional<double> tolerance_m;
   std::optional<double> grid_cells;
 };
