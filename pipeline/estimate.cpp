@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
-#include <thread>
 
+#include "pipeline/machine_share.h"
 #include "pipeline/tile_builder.h"
 
 namespace qmpipe {
@@ -98,7 +98,7 @@ Estimate estimate_build(const BuildOptions& options, const BuildPlan& plan,
     core_s += zoom.seconds;
     estimate.zooms.push_back(zoom);
   }
-  const auto cores = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
+  const auto cores = usable_threads();
   estimate.seconds = core_s / std::min(cores, options.run.threads);
   return estimate;
 }

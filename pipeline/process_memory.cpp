@@ -2,13 +2,14 @@
 
 #include <malloc.h>
 #include <sys/resource.h>
-#include <unistd.h>
+
+#include "pipeline/machine_share.h"
 
 namespace qmpipe {
 
 std::int64_t memory_limit_bytes(std::int64_t wanted_bytes) {
   if (wanted_bytes > 0) return wanted_bytes;
-  return static_cast<std::int64_t>(sysconf(_SC_PHYS_PAGES)) / 10 * 9 * sysconf(_SC_PAGESIZE);
+  return usable_memory_bytes() / 10 * 9;
 }
 
 std::int64_t peak_resident_bytes() {

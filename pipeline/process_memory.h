@@ -5,8 +5,8 @@
 
 namespace qmpipe {
 
-// What the user allows, or nine tenths of the machine's memory where that is 0: running out of it
-// would end the process without a word.
+// What the user allows, or nine tenths of what the process may use of the machine's memory
+// (pipeline/machine_share.h) where that is 0: running out of it would end the process without a word.
 std::int64_t memory_limit_bytes(std::int64_t wanted_bytes);
 
 // The most that was resident so far.

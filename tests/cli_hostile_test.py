@@ -280,6 +280,13 @@ class CliHostile(unittest.TestCase):
                     if done.returncode in (1, 2):
                         self.assertRegex(done.said, "(?m)^qmpipe: .*(memory|MiB|thread|resource)")
 
+    def test_the_default_of_threads_is_what_the_process_may_use(self):
+        one = min(os.sched_getaffinity(0))
+        done = run("build", self.dem, "--dry-run", "-v",
+                   preexec_fn=lambda: os.sched_setaffinity(0, {one}))
+        self.assertEqual(done.returncode, 0, done.said)
+        self.assertRegex(done.said, r"threads +1\n")
+
     # Somebody else's set.
 
     def set_with_crs(self, text):

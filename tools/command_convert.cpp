@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -11,7 +10,6 @@
 #include <optional>
 #include <string>
 #include <system_error>
-#include <thread>
 
 #include <fmt/format.h>
 
@@ -20,6 +18,7 @@
 #include "formats/printable.h"
 #include "formats/tile_set.h"
 #include "pipeline/convert.h"
+#include "pipeline/machine_share.h"
 #include "pipeline/progress.h"
 #include "tools/interrupt.h"
 #include "tools/parse_values.h"
@@ -152,7 +151,7 @@ void register_one(CLI::App& app, std::function<int()>& action, const char* name,
                   const char* description, Demand demand) {
   const auto arguments = std::make_shared<ConvertArguments>();
   arguments->demand = demand;
-  arguments->threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
+  arguments->threads = usable_threads();
   CLI::App* command = app.add_subcommand(name, description);
   command->footer(kFooter);
   command

@@ -2,18 +2,17 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "formats/detail_file.h"
 #include "formats/errors.h"
 #include "formats/folders.h"
 #include "formats/printable.h"
 #include "pipeline/detail_build.h"
+#include "pipeline/machine_share.h"
 #include "pipeline/process_memory.h"
 #include "tools/detail_commands.h"
 #include "tools/interrupt.h"
@@ -123,7 +122,7 @@ int run_build(BuildArguments arguments) {
 void register_detail_build(CLI::App& detail, std::function<int()>& action) {
   const auto arguments = std::make_shared<BuildArguments>();
   DetailBuildOptions& options = arguments->options;
-  options.threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
+  options.threads = usable_threads();
   CLI::App* command =
       detail.add_subcommand("build", "Turn points or a DEM into a detail-increment model");
   command->footer(kFooter);

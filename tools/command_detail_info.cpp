@@ -2,12 +2,10 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
@@ -16,6 +14,7 @@
 #include "pipeline/detail_extract.h"
 #include "pipeline/detail_increments.h"
 #include "pipeline/detail_verify.h"
+#include "pipeline/machine_share.h"
 #include "tools/detail_commands.h"
 #include "tools/interrupt.h"
 
@@ -149,7 +148,7 @@ int run_info(const InfoArguments& arguments) {
 
 void register_detail_verify(CLI::App& detail, std::function<int()>& action) {
   const auto arguments = std::make_shared<VerifyArguments>();
-  arguments->threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
+  arguments->threads = usable_threads();
   CLI::App* command =
       detail.add_subcommand("verify", "Check a model by walking through its levels");
   command->footer(

@@ -3,14 +3,13 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "formats/tile_set.h"
 #include "pipeline/diff_sets.h"
+#include "pipeline/machine_share.h"
 #include "pipeline/progress.h"
 #include "tools/interrupt.h"
 #include "tools/number_options.h"
@@ -60,7 +59,7 @@ int run_diff(const DiffArguments& arguments) {
 void register_diff(CLI::App& app, std::function<int()>& action) {
   const auto arguments = std::make_shared<DiffArguments>();
   DiffOptions& options = arguments->options;
-  options.threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
+  options.threads = usable_threads();
   CLI::App* command = app.add_subcommand(
       "diff", "Compare two tile sets: layer.json, which tiles there are, and what differs in them");
   command->footer(kFooter);

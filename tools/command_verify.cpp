@@ -3,13 +3,12 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <string>
-#include <thread>
 
 #include "formats/tile_set.h"
+#include "pipeline/machine_share.h"
 #include "pipeline/progress.h"
 #include "pipeline/verify.h"
 #include "tools/interrupt.h"
@@ -72,7 +71,7 @@ int run_verify(VerifyArguments arguments) {
 void register_verify(CLI::App& app, std::function<int()>& action) {
   const auto arguments = std::make_shared<VerifyArguments>();
   VerifyOptions& options = arguments->options;
-  options.threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
+  options.threads = usable_threads();
   CLI::App* command = app.add_subcommand(
       "verify",
       "Check a finished tile set: tiles, cracks, layer.json, and heights against a source");

@@ -1,10 +1,9 @@
 #include "tools/pyramid_arguments.h"
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <thread>
 
 #include "formats/errors.h"
+#include "pipeline/machine_share.h"
 #include "tools/parse_values.h"
 
 namespace qmpipe {
@@ -66,8 +65,9 @@ void add_mesh_options(CLI::App& command, PyramidArguments& arguments) {
 
 void add_machine_options(CLI::App& command, PyramidArguments& arguments) {
   RunOptions& run = arguments.options.run;
-  run.threads = static_cast<std::int32_t>(std::max(1U, std::thread::hardware_concurrency()));
-  command.add_option("--threads", run.threads, "Threads to work with (default: all cores)");
+  run.threads = usable_threads();
+  command.add_option("--threads", run.threads,
+                     "Threads to work with (default: all processors that it may use)");
   add_memory_option(command, arguments.memory);
 }
 
