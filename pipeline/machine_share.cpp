@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <fstream>
 #include <memory>
 #include <sstream>
@@ -74,7 +75,7 @@ void read_version_1(CgroupLimits& limits, const fs::path& root, const std::strin
 
 std::int32_t processors_of_affinity() {
   // Machines may have more processors than a cpu_set_t has places.
-  for (int places = 1024; places <= 1 << 20; places *= 2) {
+  for (std::size_t places = 1024; places <= 1U << 20U; places *= 2) {
     const auto set = std::unique_ptr<cpu_set_t, void (*)(cpu_set_t*)>(
         CPU_ALLOC(places), [](cpu_set_t* given) { CPU_FREE(given); });
     if (!set) break;

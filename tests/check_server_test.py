@@ -327,7 +327,7 @@ class OneFault(unittest.TestCase):
         files = with_layer(FILES, format="\x1b[2J\x07")
         with serving(files) as address:
             done = served_set.run(QMPIPE, "check", address)
-            self.assertIn("?[2J?", done.stdout)
+            self.assertIn(r"\u001b[2J\u0007", done.stdout)
             self.assertNotIn("\x1b", done.stdout)
 
     def test_a_page_that_is_named_makes_cors_a_fault(self):

@@ -95,7 +95,7 @@ TEST(MachineShare, AffinityDecidesTheThreads) {
   cpu_set_t before;
   ASSERT_EQ(sched_getaffinity(0, sizeof before, &before), 0);
   EXPECT_LE(usable_threads(), CPU_COUNT(&before));
-  int first = 0;
+  std::size_t first = 0;
   while (!CPU_ISSET(first, &before)) ++first;
   // Of a thread of its own: the affinity goes with it.
   std::int32_t threads = 0;
