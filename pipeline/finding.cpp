@@ -30,6 +30,7 @@ const char* name_of(FindingKind kind) {
                                                              "height-range",
                                                              "bounding-sphere",
                                                              "occlusion-point",
+                                                             "hidden-terrain",
                                                              "centre",
                                                              "normal-into-ground",
                                                              "border-vertices",

@@ -43,6 +43,7 @@ enum class FindingKind : std::uint8_t {
   kHeightRange,
   kBoundingSphere,
   kOcclusionPoint,
+  kHiddenTerrain,  // a camera that sees a vertex, from where clients leave the tile out
   kCentre,
   kNormalIntoGround,
   // Two tiles.

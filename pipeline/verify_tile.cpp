@@ -9,6 +9,7 @@
 #include "formats/oct_normal.h"
 #include "formats/tile_set.h"
 #include "pipeline/verify_cover.h"
+#include "pipeline/verify_visibility.h"
 #include "stages/geodesy.h"
 #include "stages/quantize.h"
 
@@ -89,6 +90,7 @@ class MeshCheck {
   void check_places();
   void check_sphere(const std::vector<Vec3>& positions_ecef);
   void check_occlusion(const std::vector<Vec3>& positions_ecef);
+  void check_visibility(const std::vector<Vec3>& positions_ecef);
   void check_centre(const Sphere& smallest);
   void check_normals(const std::vector<Vec3>& positions_ecef);
 
@@ -205,6 +207,7 @@ void MeshCheck::check_places() {
   }
   check_sphere(positions_ecef);
   check_occlusion(positions_ecef);
+  check_visibility(positions_ecef);
   check_normals(positions_ecef);
 }
 
@@ -248,10 +251,14 @@ void MeshCheck::check_centre(const Sphere& smallest) {
 
 void MeshCheck::check_occlusion(const std::vector<Vec3>& positions_ecef) {
   const Vec3& point = header_.horizon_occlusion_point;
-  const double magnitude = length(point);
+  double magnitude = 0;
   double needed = 0;
-  if (is_finite(point) && magnitude > 0) {
-    const Vec3 direction = scaled(point, 1 / magnitude);
+  const double largest = std::max({std::abs(point[0]), std::abs(point[1]), std::abs(point[2])});
+  if (is_finite(point) && largest > 0) {
+    // In two steps: the square of a distance as good as infinite would overflow.
+    const Vec3 shortened = scaled(point, 1 / largest);
+    magnitude = largest * length(shortened);
+    const Vec3 direction = unit(shortened);
     for (const Vec3& p : positions_ecef) {
       const double at_vertex =
           length(p) > 0 ? occlusion_magnitude(direction, p) : kAsGoodAsInfinite;
@@ -267,6 +274,17 @@ void MeshCheck::check_occlusion(const std::vector<Vec3>& positions_ecef) {
                                is_read ? "" : " (clients compute their own below height 0)")
                  : fmt::format("the horizon occlusion point is ({}, {}, {})", point[0], point[1],
                                point[2]));
+}
+
+void MeshCheck::check_visibility(const std::vector<Vec3>& positions_ecef) {
+  const std::optional<HiddenTerrain> hidden = hidden_terrain(header_, rectangle_, positions_ecef);
+  if (!hidden) return;
+  add(FindingKind::kHiddenTerrain,
+      fmt::format("from longitude {:.1f}, latitude {:.1f} at {:.0f} m vertex {} is seen, but "
+                  "CesiumJS takes the tile for hidden by the horizon and leaves it out, with all "
+                  "tiles below it",
+                  hidden->camera.longitude_deg, hidden->camera.latitude_deg,
+                  hidden->camera.height_m, hidden->vertex));
 }
 
 void MeshCheck::check_normals(const std::vector<Vec3>& positions_ecef) {

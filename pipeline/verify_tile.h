@@ -9,7 +9,8 @@
 //     in integers, without any tolerance,
 //   - has its four corners, complete sorted side lists, no vertex twice and none unused,
 //   - has a bounding sphere that holds every vertex (within 1 mm, or 1e-9 of the radius), and an
-//     occlusion point that is hidden only when every vertex is.
+//     occlusion point that is hidden only when every vertex is,
+//   - is drawn by CesiumJS from wherever one of its vertices is seen (pipeline/verify_visibility.h).
 #pragma once
 
 #include <cstdint>

@@ -12,8 +12,9 @@ namespace {
 
 constexpr int kSphereSteps = 16;
 constexpr int kSphereFirstStep = 8;
-// Far enough never to be hidden, near enough for the client's float arithmetic.
-constexpr double kNeverHidden = 1e6;
+// A finite occlusion point farther out than this is that of a tile whose rim is as good as 90 degrees
+// away.
+constexpr double kFarthestRadii = 1e3;
 
 // The latitude and height of a point, from its distance to the axis and its z.
 struct Vertical {
@@ -177,8 +178,7 @@ double occlusion_magnitude(const Vec3& unit_direction_scaled, const Vec3& point_
 }
 
 Vec3 horizon_occlusion_point(const Vec3& direction_ecef, std::span<const Vec3> points_ecef) {
-  // The sphere of a root tile may stand at the earth's centre, from where no ray is the right one.
-  if (length(direction_ecef) == 0) return {kNeverHidden, 0, 0};
+  QMPIPE_CHECK(length(direction_ecef) > 0);
   const Vec3 direction =
       unit({direction_ecef[0] / kEquatorialRadiusM, direction_ecef[1] / kEquatorialRadiusM,
             direction_ecef[2] / kPolarRadiusM});
@@ -186,7 +186,7 @@ Vec3 horizon_occlusion_point(const Vec3& direction_ecef, std::span<const Vec3> p
   for (const Vec3& p : points_ecef) {
     magnitude = std::max(magnitude, occlusion_magnitude(direction, p));
   }
-  return scaled(direction, std::min(magnitude, kNeverHidden));
+  return scaled(direction, magnitude <= kFarthestRadii ? magnitude : kNeverHiddenRadii);
 }
 
 }  // namespace qmpipe

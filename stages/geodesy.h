@@ -44,10 +44,16 @@ struct Sphere {
 // improved). REQUIRES: at least one point.
 Sphere bounding_sphere(std::span<const Vec3> points_ecef);
 
+// A point so far out that clients never find it hidden: see horizon_occlusion_point().
+inline constexpr double kNeverHiddenRadii = 1e160;
+
 // The point, in units of the ellipsoid's radii, on the ray from the earth's centre through
-// `direction_ecef` (usually the bounding sphere's centre) that is hidden by the ellipsoid only when
-// all the given points are. Where no finite point exists (a tile that spans half the globe), the
-// ray's point at a distance of 1e6 radii: it is never hidden, which is always safe.
+// `direction_ecef` (the middle of a tile's rectangle) that is hidden by the ellipsoid only when all
+// the given points are. Where no such point exists (a tile that goes half round the globe), or none
+// within 1000 radii, the ray's point at kNeverHiddenRadii. Any that is nearer would be hidden in the
+// earth's shadow, from where peaks on the tile's rim are still seen; there, CesiumJS's square of its
+// distance overflows, and a point that it cannot judge is visible.
+// REQUIRES: direction_ecef is not zero.
 Vec3 horizon_occlusion_point(const Vec3& direction_ecef, std::span<const Vec3> points_ecef);
 
 // How far along its ray a single point pushes the occlusion point; infinity where it cannot be

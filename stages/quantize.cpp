@@ -51,14 +51,17 @@ void fill_globe_fields(const PostGrid& grid, QuantizedMesh& mesh) {
     positions.push_back(decoded_position_ecef(mesh, rectangle, k));
   }
   QuantizedMeshHeader& header = mesh.header;
-  header.centre_ecef_m =
-      to_ecef({.longitude_deg = (rectangle.west_deg + rectangle.east_deg) / 2,
-               .latitude_deg = (rectangle.south_deg + rectangle.north_deg) / 2,
-               .height_m = (static_cast<double>(header.min_height_m) + header.max_height_m) / 2});
+  GeoPoint middle = {.longitude_deg = (rectangle.west_deg + rectangle.east_deg) / 2,
+                     .latitude_deg = (rectangle.south_deg + rectangle.north_deg) / 2,
+                     .height_m = 0};
+  // Not through the sphere's centre: that of a tile of a hemisphere is near the earth's, and the
+  // direction to it nothing but noise.
+  header.horizon_occlusion_point = horizon_occlusion_point(to_ecef(middle), positions);
+  middle.height_m = (static_cast<double>(header.min_height_m) + header.max_height_m) / 2;
+  header.centre_ecef_m = to_ecef(middle);
   const Sphere sphere = bounding_sphere(positions);
   header.sphere_centre_ecef_m = sphere.centre;
   header.sphere_radius_m = sphere.radius_m;
-  header.horizon_occlusion_point = horizon_occlusion_point(sphere.centre, positions);
 }
 
 }  // namespace

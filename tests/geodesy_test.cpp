@@ -216,8 +216,11 @@ TEST(HorizonOcclusion, DepthsCountAsTheSurfaceAndHalfAGlobeIsNeverHidden) {
   const Vec3 trench = to_ecef({140, 11, -10000});
   EXPECT_NEAR(length(horizon_occlusion_point(trench, std::vector<Vec3>{trench})), 1, 1e-9);
   const std::vector<Vec3> half = {to_ecef({0, 0, 0}), to_ecef({90, 0, 0}), to_ecef({180, 0, 0})};
-  EXPECT_NEAR(length(horizon_occlusion_point({0, 1, 0}, half)), 1e6, 1);
-  EXPECT_NEAR(length(horizon_occlusion_point({0, 0, 0}, half)), 1e6, 1);
+  const Vec3 away = horizon_occlusion_point({0, 1, 0}, half);
+  EXPECT_NEAR(away[1] / kNeverHiddenRadii, 1, 1e-12);
+  // As good as half a globe: its rim is 0.01 degrees short of it.
+  const std::vector<Vec3> nearly = {to_ecef({0.01, 0, 0}), to_ecef({179.99, 0, 0})};
+  EXPECT_EQ(horizon_occlusion_point({0, 1, 0}, nearly), away);
 }
 
 }  // namespace

@@ -158,6 +158,18 @@ std::vector<Case> tile_cases() {
       {"OcclusionNan", "occlusion-point", leaf([](Mesh& m) {
          m.header.horizon_occlusion_point[1] = std::numeric_limits<double>::quiet_NaN();
        })},
+      // The direction that the noise of a hemisphere's sphere gives: nothing is drawn opposite to it.
+      {"RootHiddenFromOneSide", "hidden-terrain",
+       [](const SetFixture& set) {
+         set.change({0, 0, 0}, [](Mesh& m) {
+           m.header.horizon_occlusion_point = {-6e5, -7e5, -3e5};
+         });
+       }},
+      // Along the middle, but near enough to be hidden in the earth's shadow.
+      {"RootHiddenInTheShadow", "hidden-terrain",
+       [](const SetFixture& set) {
+         set.change({0, 1, 0}, [](Mesh& m) { m.header.horizon_occlusion_point = {0, 1e6, 0}; });
+       }},
       {"CentreElsewhere", "centre", leaf([](Mesh& m) {
          m.header.centre_ecef_m = {0, 0, 0};
        })},

@@ -22,9 +22,9 @@ constexpr int kExitFaults = 3;
 constexpr const char* kFooter =
     "Checks every tile: that it can be read under the strictest reading of the format; that its\n"
     "triangles are counter-clockwise and cover the tile's square exactly once; corners and side\n"
-    "lists; the header's height range, bounding sphere and horizon occlusion point. Checks\n"
-    "neighbours: the same border vertices, less than 1 mm apart, with equal normals, across the\n"
-    "antimeridian too. Checks layer.json against the files: each listed tile is there and each\n"
+    "lists; the header's height range, bounding sphere and horizon occlusion point; that CesiumJS\n"
+    "draws it from wherever it is seen. Checks neighbours: the same border vertices, less than\n"
+    "1 mm apart, with equal normals, across the antimeridian too. Checks layer.json against the files: each listed tile is there and each\n"
     "tile is listed, with its parents and the roots; extensions as listed.\n"
     "\n"
     "With --source, also the vertical distance between each zoom's posts and the decoded surface.\n"

@@ -113,7 +113,7 @@ void print_text(const TilePlace& place, const TileFile& file) {
        fmt::format("{} m (ECEF), radius {:.3f} m", text_of(header.sphere_centre_ecef_m),
                    header.sphere_radius_m));
   const Vec3& occlusion = header.horizon_occlusion_point;
-  line("horizon occlusion", fmt::format("{:.9f} {:.9f} {:.9f} ellipsoid radii", occlusion[0],
+  line("horizon occlusion", fmt::format("{:.9g} {:.9g} {:.9g} ellipsoid radii", occlusion[0],
                                         occlusion[1], occlusion[2]));
 }
 
