@@ -4,6 +4,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
+
+#include "scheduler/elementary.h"
 
 namespace qmpipe {
 namespace {
@@ -12,6 +15,9 @@ constexpr int kStepsPerSide = 256;
 constexpr int kStepsInside = 32;
 // A gap in the longitudes narrower than this is the distance between two of our points.
 constexpr double kWidestStepDeg = 12;
+constexpr int kPlacesPerSide = 5;
+// Some 600 m.
+constexpr double kStepRad = 1e-4;
 
 std::vector<PixelPoint> points_of(const RasterSize& size) {
   const double width = static_cast<double>(size.width);
@@ -56,6 +62,73 @@ RectangleDeg range_of(std::vector<double> longitudes_deg) {
 }
 
 double turned_into_half_circle(double degrees) { return std::remainder(degrees, 360.0); }
+
+// On the sphere of the latitudes, not on the ellipsoid: so that a step along the meridian is as long
+// as its degrees.
+using Direction = std::array<double, 3>;
+
+Direction direction_of(const LonLat& at) {
+  const SinCos longitude = sin_cos_deg(at.longitude_deg);
+  const SinCos latitude = sin_cos_deg(at.latitude_deg);
+  return {latitude.cos * longitude.cos, latitude.cos * longitude.sin, latitude.sin};
+}
+
+double dot(const Direction& a, const Direction& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// A pixel's two steps, in radians to the east and to the north of its middle. Differences of
+// longitudes would be anything at all beside a pole.
+struct PixelOnGlobe {
+  double column_east = 0;
+  double column_north = 0;
+  double row_east = 0;
+  double row_north = 0;
+  double parallel = 1;  // the radius of the parallel
+
+  double longer_side() const {
+    return std::sqrt(std::max(column_east * column_east + column_north * column_north,
+                              row_east * row_east + row_north * row_north));
+  }
+  // How far posts may be apart along the parallel and along the meridian, so that no more than a
+  // pixel lies between two of them.
+  double post_spacing_deg() const {
+    const double area = std::abs(column_east * row_north - column_north * row_east);
+    const double along_parallel =
+        area / std::sqrt(column_north * column_north + row_north * row_north) / parallel;
+    const double along_meridian = area / std::sqrt(column_east * column_east + row_east * row_east);
+    return std::min(along_parallel, along_meridian) * (180 / std::numbers::pi);
+  }
+};
+
+// Measured between two places `step` pixels on both sides, along the columns and along the rows.
+std::optional<PixelOnGlobe> pixel_on_globe(const ToGlobe& to_globe, const PixelPoint& place,
+                                           double step) {
+  const std::optional<LonLat> at = to_globe(place);
+  const std::optional<LonLat> west = to_globe({place.column - step, place.row});
+  const std::optional<LonLat> east = to_globe({place.column + step, place.row});
+  const std::optional<LonLat> above = to_globe({place.column, place.row - step});
+  const std::optional<LonLat> below = to_globe({place.column, place.row + step});
+  if (!at || !west || !east || !above || !below) return std::nullopt;
+  const SinCos longitude = sin_cos_deg(at->longitude_deg);
+  const SinCos latitude = sin_cos_deg(at->latitude_deg);
+  const Direction to_east = {-longitude.sin, longitude.cos, 0};
+  const Direction to_north = {-latitude.sin * longitude.cos, -latitude.sin * longitude.sin,
+                              latitude.cos};
+  const auto side = [step](const LonLat& from, const LonLat& to) {
+    const Direction a = direction_of(from);
+    const Direction b = direction_of(to);
+    return Direction{(b[0] - a[0]) / (2 * step), (b[1] - a[1]) / (2 * step),
+                     (b[2] - a[2]) / (2 * step)};
+  };
+  const Direction by_column = side(*west, *east);
+  const Direction by_row = side(*above, *below);
+  return PixelOnGlobe{.column_east = dot(by_column, to_east),
+                      .column_north = dot(by_column, to_north),
+                      .row_east = dot(by_row, to_east),
+                      .row_north = dot(by_row, to_north),
+                      .parallel = latitude.cos};
+}
 
 }  // namespace
 
@@ -115,26 +188,23 @@ std::optional<RectangleDeg> bounds_on_globe(const RasterSize& size, const ToGlob
 double smallest_pixel_deg(const RasterSize& size, const ToGlobe& to_globe) {
   const double width = static_cast<double>(size.width);
   const double height = static_cast<double>(size.height);
-  const std::array<PixelPoint, 5> places = {{{0, 0},
-                                             {width - 1, 0},
-                                             {0, height - 1},
-                                             {width - 1, height - 1},
-                                             {std::floor(width / 2), std::floor(height / 2)}}};
   double smallest = std::numeric_limits<double>::infinity();
-  for (const PixelPoint& place : places) {
-    const std::optional<LonLat> at = to_globe(place);
-    const std::optional<LonLat> east = to_globe({place.column + 1, place.row});
-    const std::optional<LonLat> south = to_globe({place.column, place.row + 1});
-    if (!at || !east || !south) continue;
-    const auto steps = [&at](const LonLat& to) {
-      return LonLat{std::abs(turned_into_half_circle(to.longitude_deg - at->longitude_deg)),
-                    std::abs(to.latitude_deg - at->latitude_deg)};
-    };
-    const LonLat by_column = steps(*east);
-    const LonLat by_row = steps(*south);
-    for (const double extent : {std::max(by_column.longitude_deg, by_row.longitude_deg),
-                                std::max(by_column.latitude_deg, by_row.latitude_deg)}) {
-      if (extent > 0) smallest = std::min(smallest, extent);
+  for (int r = 0; r < kPlacesPerSide; ++r) {
+    for (int c = 0; c < kPlacesPerSide; ++c) {
+      const auto middle = [](double length, int k) {
+        return std::floor((length - 1) * k / (kPlacesPerSide - 1)) + 0.5;
+      };
+      const PixelPoint place{.column = middle(width, c), .row = middle(height, r)};
+      const std::optional<PixelOnGlobe> rough = pixel_on_globe(to_globe, place, 0.5);
+      if (!rough || !(rough->longer_side() > 0)) continue;
+      // Far enough for the last digits of a fine pixel, near enough for the arcs of a coarse one.
+      const double step = std::min(kStepRad / rough->longer_side(), std::min(width, height) / 2);
+      const PixelPoint inside{.column = std::clamp(place.column, step, width - step),
+                              .row = std::clamp(place.row, step, height - step)};
+      const std::optional<PixelOnGlobe> pixel = pixel_on_globe(to_globe, inside, step);
+      if (!pixel) continue;
+      const double extent_deg = pixel->post_spacing_deg();
+      if (extent_deg > 0) smallest = std::min(smallest, extent_deg);
     }
   }
   return std::isfinite(smallest) ? smallest : 0;

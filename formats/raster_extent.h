@@ -28,7 +28,7 @@ std::optional<RectangleDeg> bounds_on_globe(const RasterSize& size, const ToGlob
 // West moved into [-180, 180), at most one turn wide, latitudes cut at the poles.
 RectangleDeg tidy_bounds(const RectangleDeg& bounds);
 
-// See RasterInfo::pixel_deg; 0 when it cannot be measured anywhere.
+// See GridInfo::pixel_deg, measured on the globe at 5 x 5 places; 0 when it cannot be measured anywhere.
 double smallest_pixel_deg(const RasterSize& size, const ToGlobe& to_globe);
 
 }  // namespace qmpipe

@@ -85,6 +85,13 @@ PixelPoint PixelPlane::pixel_of(const MapPoint& m) const {
           .row = (x_per_column * y - y_per_column * x) / determinant()};
 }
 
+double PixelPlane::smaller_extent() const {
+  if (is_axis_aligned()) return std::min(std::abs(x_per_column), std::abs(y_per_row));
+  const auto length = [](double a, double b) { return std::sqrt(a * a + b * b); };
+  const double area = std::abs(determinant());
+  return std::min(area / length(y_per_column, y_per_row), area / length(x_per_column, x_per_row));
+}
+
 std::int64_t columns_of_a_turn(const GridInfo& info) {
   QMPIPE_CHECK(info.placement != nullptr);
   const double pixels = turn_pixels(info);
@@ -163,7 +170,7 @@ void RasterGrid::measure() {
                                     .south_deg = std::min(first.y, last.y),
                                     .east_deg = std::max(first.x, last.x),
                                     .north_deg = std::max(first.y, last.y)});
-    info_.pixel_deg = std::min(std::abs(info_.plane.x_per_column), std::abs(info_.plane.y_per_row));
+    info_.pixel_deg = info_.plane.smaller_extent();
     return;
   }
   const ToGlobe to_globe = [this](const PixelPoint& p) { return globe_at(p); };
@@ -171,7 +178,10 @@ void RasterGrid::measure() {
       size, to_globe,
       [this](const LonLat& p) { return pixel_at(p.longitude_deg, p.latitude_deg); });
   if (bounds) info_.bounds_deg = widened(*bounds);
-  info_.pixel_deg = smallest_pixel_deg(size, to_globe);
+  // Degrees of another datum are as long; at a pole they can be measured no better.
+  info_.pixel_deg = info_.placement->crs.is_geographic
+                        ? info_.plane.smaller_extent() * info_.plane.unit
+                        : smallest_pixel_deg(size, to_globe);
 }
 
 }  // namespace qmpipe

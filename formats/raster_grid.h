@@ -42,6 +42,8 @@ struct PixelPlane {
   // One unit of x and y: degrees in a geographic CRS, else metres.
   double unit = 1;
 
+  // A pixel's smaller extent along x or along y, in their unit.
+  double smaller_extent() const;
   double determinant() const { return x_per_column * y_per_row - x_per_row * y_per_column; }
   bool is_axis_aligned() const { return x_per_row == 0 && y_per_column == 0; }
   MapPoint map_of(const PixelPoint& p) const {
@@ -62,8 +64,9 @@ struct GridInfo {
   std::int64_t height = 0;
   PixelPlane plane;
   // From here on only where the grid is placed on the globe.
-  // Smallest extent of a pixel in degrees of longitude or latitude, measured at several places;
-  // decides the sampling zoom.
+  // How far posts may be apart, in degrees of longitude as of latitude, so that no more than a pixel
+  // lies between two of them: a pixel's smaller extent in a geographic CRS, else the smallest of what
+  // is measured at several places. Decides the sampling zoom.
   double pixel_deg = 0;
   // The grid's extent. east_deg - west_deg <= 360; east_deg may exceed 180 when the grid crosses the
   // antimeridian (then west_deg is in [-180, 180]).

@@ -12,6 +12,7 @@
 #include "formats/file_bytes.h"
 #include "formats/layer_json.h"
 #include "formats/tile_output.h"
+#include "pipeline/block_cover.h"
 #include "pipeline/build_plan.h"
 #include "pipeline/fingerprint.h"
 #include "pipeline/memory_share.h"
@@ -71,6 +72,19 @@ void note_assumptions(const std::vector<RasterInfo>& sources, Progress& progress
         "heights above the WGS84 ellipsoid (heights above sea level will stand off by the geoid's "
         "height, up to 100 m)");
   }
+}
+
+// Reducing is what makes coarse posts right, so a smaller --max-zoom does not spare it.
+void note_sampling(const SurveyOptions& survey, const std::vector<RasterInfo>& sources,
+                   Progress& progress) {
+  const std::int32_t zoom = chosen_sampling_zoom(survey, sources);
+  if (survey.max_zoom < 0 || survey.max_zoom >= zoom) return;
+  const std::int64_t posts =
+      expected_blocks(survey.scheme, zoom, sources) * (std::int64_t{kBlockPosts} * kBlockPosts);
+  progress.note(fmt::format(
+      "tiles end at zoom {}, but posts are taken at zoom {}, where they are no wider apart than "
+      "the pixels, and reduced: at most {} posts, {} while the run lasts",
+      survey.max_zoom, zoom, posts, bytes_text(posts * static_cast<std::int64_t>(sizeof(float)))));
 }
 
 void require_data(const Survey& survey) {
@@ -289,6 +303,7 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   }
   require_a_zoom(options, options.mesh.max_zoom.value_or(chosen_sampling_zoom(to_survey, sources)));
   note_assumptions(sources, progress);
+  note_sampling(to_survey, sources, progress);
   // Refuses what cannot work before anything is made on disk.
   share_memory(memory_request(options), to_survey, sources);
   RunPlace place = open_place(options, progress);

@@ -27,6 +27,7 @@ struct MeshOptions {
   Projection projection = Projection::kGeodetic;
   // DEFAULT: 0. Above 0 the set has no roots, which few clients can use.
   std::int32_t min_zoom = 0;
+  // Of tiles; a smaller one than the sampling zoom does not make the survey read or keep less.
   // DEFAULT: the sampling zoom, that is the coarsest whose posts are no wider apart than the pixels.
   std::optional<std::int32_t> max_zoom;
   // DEFAULT: greedy.

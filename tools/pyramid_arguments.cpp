@@ -48,7 +48,9 @@ void add_mesh_options(CLI::App& command, PyramidArguments& arguments) {
       ->capture_default_str();
   command.add_option(
       "--max-zoom", arguments.max_zoom,
-      "Deepest zoom (default: the coarsest whose posts are no wider apart than pixels)");
+      "Deepest zoom of tiles (default: the coarsest whose posts are no wider apart than pixels). A "
+      "smaller one does not make a run read or keep less: posts are taken at the default and "
+      "reduced");
   command
       .add_option(
           "--tolerance", arguments.tolerance_m,
