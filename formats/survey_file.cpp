@@ -15,9 +15,9 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::array<std::uint8_t, 8> kMagic = {'Q', 'M', 'S', 'U', 'R', 'V', '0', '1'};
+constexpr std::array<std::uint8_t, 8> kMagic = {'Q', 'M', 'S', 'U', 'R', 'V', '0', '2'};
 constexpr std::size_t kHeadBytes = kMagic.size() + 6 * sizeof(std::int32_t);
-constexpr std::size_t kTileBytes = 5 * sizeof(std::int32_t);
+constexpr std::size_t kTileBytes = 6 * sizeof(std::int32_t);
 // All tiles of the deepest zoom that any machine could survey.
 constexpr std::size_t kMostBytes = std::size_t{1} << 36U;
 constexpr std::int32_t kMostPosts = kTilePosts * kTilePosts;
@@ -39,6 +39,7 @@ std::string fault_of(const SurveyedTile& tile, const TilingScheme& scheme) {
   if (tile.valid_posts < 1 || tile.valid_posts > kMostPosts) {
     return "has an impossible number of valid posts";
   }
+  if (!(tile.rim_m >= 0 && tile.rim_m <= 1e30F)) return "has an impossible rim";
   return "";
 }
 
@@ -64,6 +65,7 @@ void write_survey_file(const std::filesystem::path& path, std::int32_t zoom,
     append(bytes, tile.lowest_m);
     append(bytes, tile.highest_m);
     append(bytes, tile.valid_posts);
+    append(bytes, tile.rim_m);
   }
   append_seal(bytes, {});
   write_file_durably(path, bytes);
@@ -101,6 +103,7 @@ Result<SurveyedZoom> parse_surveyed_zoom(std::span<const std::uint8_t> bytes, st
     tile.lowest_m = numbers.next<float>();
     tile.highest_m = numbers.next<float>();
     tile.valid_posts = numbers.next<std::int32_t>();
+    tile.rim_m = numbers.next<float>();
     std::string fault = fault_of(tile, scheme);
     if (fault.empty() && last != nullptr && !(last->key < tile.key)) fault = "is out of order";
     if (!fault.empty()) return Error{fmt::format("tile {} {}", to_string(tile.key), fault)};

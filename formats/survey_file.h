@@ -1,9 +1,10 @@
 // What the survey learned about one zoom, in a file: so that an interrupted run need not read the
 // whole lattice again to know it.
 //
-// Layout, little-endian: "QMSURV01", zoom (int32), number of tiles (int32), for the south and the
+// Layout, little-endian: "QMSURV02", zoom (int32), number of tiles (int32), for the south and the
 // north pole 1 or 0 (int32: has a height) and the height in metres (float32), then for each tile x, y
-// (int32), lowest_m, highest_m (float32), valid_posts (int32); a seal (formats/file_seal.h).
+// (int32), lowest_m, highest_m (float32), valid_posts (int32), rim_m (float32); a seal
+// (formats/file_seal.h).
 #pragma once
 
 #include <array>
@@ -24,6 +25,8 @@ struct SurveyedTile {
   float lowest_m = 0;
   float highest_m = 0;
   std::int32_t valid_posts = 0;
+  // How far from 0 m the valid posts next to a void reach; 0 where no void is next to one.
+  float rim_m = 0;
   friend bool operator==(const SurveyedTile&, const SurveyedTile&) = default;
 };
 

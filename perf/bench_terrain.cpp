@@ -175,9 +175,10 @@ std::vector<BenchTile> bench_tiles() {
 
 GreedyOptions options_for(const BenchTile& tile, double tolerance_m) {
   const auto [lowest, highest] = std::minmax_element(tile.heights_m.begin(), tile.heights_m.end());
-  const auto step_m = height_step_for(tolerance_m, static_cast<double>(*highest - *lowest));
+  const auto step_m = height_step_for(tolerance_m, static_cast<double>(*highest - *lowest),
+                                      std::max(std::abs(*lowest), std::abs(*highest)));
   QMPIPE_CHECK(step_m);
-  return {.tolerance_m = tolerance_m, .height_step_m = *step_m};
+  return {.tolerance_m = tolerance_m, .height_steps = *step_m};
 }
 
 GreedyOptions options_for_vertices(const BenchTile& tile, std::size_t vertices) {

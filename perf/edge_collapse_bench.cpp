@@ -59,14 +59,14 @@ void report(benchmark::State& state, const BenchTile& tile, const Tin& tin) {
 }
 
 void to_edges(benchmark::State& state, const BenchTile& tile) {
-  const EdgeCollapseOptions options = {.height_step_m = kHeightStepM, .least_edges = kEdges};
+  const EdgeCollapseOptions options = {.height_steps = kHeightStepM, .least_edges = kEdges};
   Tin tin;
   for (auto _ : state) tin = edge_collapse(tile.grid, tile.heights_m, {}, options);
   report(state, tile, tin);
 }
 
 void to_tolerance(benchmark::State& state, const BenchTile& tile, const GreedyOptions& greedy) {
-  const EdgeCollapseOptions options = {.height_step_m = greedy.height_step_m,
+  const EdgeCollapseOptions options = {.height_steps = greedy.height_steps,
                                        .tolerance_m = greedy.tolerance_m};
   Tin tin;
   for (auto _ : state) tin = edge_collapse(tile.grid, tile.heights_m, {}, options);

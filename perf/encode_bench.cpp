@@ -20,7 +20,7 @@ namespace {
 // A tile at every step of its way.
 struct Steps {
   BenchTile tile;
-  double height_step_m = 0;
+  HeightSteps height_steps;
   Tin inserted;
   Tin ordered;
   QuantizedMesh mesh;  // with normals
@@ -31,10 +31,10 @@ std::shared_ptr<const Steps> steps_of(const BenchTile& tile, std::size_t vertice
   const GreedyOptions options = options_for_vertices(tile, vertices);
   auto steps = std::make_shared<Steps>();
   steps->tile = tile;
-  steps->height_step_m = options.height_step_m;
+  steps->height_steps = options.height_steps;
   steps->inserted = greedy_insertion(tile.grid, tile.heights_m, {}, options);
   steps->ordered = strip_ordered(steps->inserted);
-  steps->mesh = quantize(tile.grid, steps->ordered, options.height_step_m);
+  steps->mesh = quantize(tile.grid, steps->ordered, options.height_steps);
   steps->mesh.normals =
       tile_normals(tile.scheme, tile.key, tile.grid, tile.window, steps->ordered.vertices);
   steps->bytes = encode(steps->mesh);
@@ -64,7 +64,7 @@ void register_tile(const std::string& name, const std::shared_ptr<const Steps>& 
     return std::size_t{0};
   });
   register_step("quantize/" + name, steps, [](const Steps& s) {
-    benchmark::DoNotOptimize(quantize(s.tile.grid, s.ordered, s.height_step_m).h.data());
+    benchmark::DoNotOptimize(quantize(s.tile.grid, s.ordered, s.height_steps).h.data());
     return std::size_t{0};
   });
   register_step("normals/" + name, steps, [](const Steps& s) {

@@ -38,7 +38,7 @@ void register_case(const std::string& name, const std::shared_ptr<const BenchTil
 void register_benchmarks() {
   for (const BenchTile& terrain : bench_tiles()) {
     const auto tile = std::make_shared<const BenchTile>(terrain);
-    PointSetOptions options{.height_step_m = 0.25};
+    PointSetOptions options{.height_steps = 0.25};
     register_case("random", tile, options);
     options.method = PointSetMethod::kGrid;
     register_case("grid", tile, options);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
@@ -247,7 +248,8 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
   give_back_freed_memory();
   require_data(survey);
   const BuildPlan plan = plan_build(options, survey);
-  const Heightfield heightfield(*survey.store, survey.scheme, options.mesh.voids,
+  for (const std::string& note : plan.notes) progress.note(note);
+  const Heightfield heightfield(*survey.store, survey.scheme, plan.recipe.voids,
                                 survey.pole_heights);
   BuildResult result;
   result.recipe = plan.recipe;
@@ -270,6 +272,25 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
                         {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   sink->close(write_layer_json(layer));
   return result;
+}
+
+// The output's folder and those above it that are not there yet, the deepest first.
+std::vector<std::filesystem::path> missing_folders(const std::filesystem::path& output) {
+  std::vector<std::filesystem::path> missing;
+  if (output.empty()) return missing;
+  for (std::filesystem::path folder = folder_of(output);
+       !folder.empty() && !std::filesystem::exists(folder); folder = folder.parent_path()) {
+    missing.push_back(folder);
+  }
+  return missing;
+}
+
+// What a run that has come to nothing has made for its tiles; a folder that holds something stays.
+void remove_empty_folders(const std::vector<std::filesystem::path>& folders) {
+  for (const std::filesystem::path& folder : folders) {
+    std::error_code not_empty;
+    std::filesystem::remove(folder, not_empty);
+  }
 }
 
 // A finished set of the same inputs and parameters is what was asked for; another one is refused here,
@@ -306,6 +327,7 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   note_sampling(to_survey, sources, progress);
   // Refuses what cannot work before anything is made on disk.
   share_memory(memory_request(options), to_survey, sources);
+  const std::vector<std::filesystem::path> made = missing_folders(options.output.path);
   RunPlace place = open_place(options, progress);
   try {
     BuildResult result = build_in_place(options, to_survey, sources, place, progress);
@@ -319,6 +341,17 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
       next = "the checkpoint is kept: run the same command again to go on";
     }
     throw Interrupted(fmt::format("{}; {}", interrupted.what(), next));
+  } catch (const UsageError&) {
+    // With other options the survey is another run's.
+    if (place.record != nullptr) place.record->discard();
+    place = {};
+    remove_empty_folders(made);
+    throw;
+  } catch (const IoError&) {
+    const bool goes_on = place.record != nullptr && place.record->is_worth_keeping();
+    place = {};
+    if (!goes_on) remove_empty_folders(made);
+    throw;
   }
 }
 

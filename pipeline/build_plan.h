@@ -2,6 +2,7 @@
 // order, with which tolerance and height step.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "pipeline/build_options.h"
@@ -16,12 +17,19 @@ struct BuildPlan {
   WavefrontPlan wavefront;
   // By zoom, 0..max_zoom; empty below min_zoom. Sorted.
   std::vector<std::vector<TileKey>> keys;
+  // What was decided otherwise than the options' defaults say; each a sentence without a full stop.
+  std::vector<std::string> notes;
 
   std::int64_t tile_count() const { return static_cast<std::int64_t>(wavefront.tiles.size()); }
 };
 
-// Tiles with data, both roots, and the parent of every tile. Throws UsageError when the format
-// cannot hold a zoom's tolerance (height_step_for).
+// Whether a tile with data is written for its own sake: with VoidPolicy::Kind::kOmit only one without
+// voids, pole rows aside.
+bool is_wanted(const VoidPolicy& policy, const TilingScheme& scheme, const SurveyedTile& tile);
+
+// Wanted tiles, both roots, and the parent of every tile. Where the format cannot hold a zoom's tolerance
+// (height_step_for), a default one is raised to the least that works, and noted; of one that was given,
+// UsageError tells an option that works. Throws IoError when the lattice cannot be read.
 BuildPlan plan_build(const BuildOptions& options, const Survey& survey);
 
 }  // namespace qmpipe

@@ -51,7 +51,8 @@ std::optional<TileKey> choose_tile(const VerifyReport& report) {
 TileTrial try_tile(const Recipe& recipe, const TileKey& key, std::span<const float> heights_m) {
   const TilingScheme scheme(recipe.projection);
   const PostGrid grid = make_tile_grid(scheme, key);
-  const MethodOptions options = recipe.options_for(key);
+  const HeightSteps steps = recipe.steps_for(key.zoom, heights_m);
+  const MethodOptions options = recipe.options_for(key, steps);
   TileTrial trial;
   std::vector<double> seconds;
   for (int run = 0; run < kTrialRuns; ++run) {
@@ -65,8 +66,7 @@ TileTrial try_tile(const Recipe& recipe, const TileKey& key, std::span<const flo
   for (const ParameterInfo& info : parameters_of(recipe.method, recipe.stop)) {
     trial.parameters.emplace(info.name, recipe.parameters_at(key.zoom).at(info.name));
   }
-  const QuantizedMesh mesh =
-      quantize(grid, trial.tin, recipe.height_step_m[static_cast<std::size_t>(key.zoom)]);
+  const QuantizedMesh mesh = quantize(grid, trial.tin, steps);
   const std::vector<std::uint8_t> valid(kTilePostCount, 1);
   trial.error = measure_error(grid, mesh, heights_m, valid);
   trial.hausdorff = tile_hausdorff(scheme, key, mesh, heights_m);

@@ -38,6 +38,8 @@ const char* name_of(FindingKind kind) {
                                                              "border-normals",
                                                              "missing-tile",
                                                              "tolerance",
+                                                             "cliff-outside",
+                                                             "levels-apart-outside",
                                                              "not-checked",
                                                              "layer-json-advice",
                                                              "oversized-sphere",

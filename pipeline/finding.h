@@ -51,8 +51,10 @@ enum class FindingKind : std::uint8_t {
   kCrack,           // the same vertices, more than 1 mm apart
   kBorderNormals,
   // The source.
-  kMissingTile,  // the source has data there, the set has no tile
-  kTolerance,    // a post farther from the surface than its zoom's tolerance
+  kMissingTile,         // the source has data there, the set has no tile
+  kTolerance,           // a post farther from the surface than its zoom's tolerance
+  kCliffOutside,        // outside the data, a slope that the data do not explain
+  kLevelsApartOutside,  // there, a tile that is not its parent's surface
   // Warnings.
   kNotChecked,
   kLayerJsonAdvice,

@@ -63,7 +63,9 @@ class Values {
 };
 
 GreedyOptions greedy_options(const Values& values, const MethodFrame& frame) {
-  GreedyOptions options{.height_step_m = frame.height_step_m, .curvature = frame.curvature};
+  GreedyOptions options{.height_steps = frame.height_steps,
+                        .side_depth_m = frame.side_depth_m,
+                        .curvature = frame.curvature};
   values.read("g_e", options.tolerance_m);
   values.read("g_g", options.initial_grid_cells);
   return options;
@@ -72,7 +74,8 @@ GreedyOptions greedy_options(const Values& values, const MethodFrame& frame) {
 EdgeCollapseOptions edge_collapse_options(Stop stop, const Values& values,
                                           const MethodFrame& frame) {
   EdgeCollapseOptions options;
-  options.height_step_m = frame.height_step_m;
+  options.height_steps = frame.height_steps;
+  options.side_depth_m = frame.side_depth_m;
   options.curvature = frame.curvature;
   if (stop == Stop::kTolerance) {
     values.read("g_e", options.tolerance_m.emplace(0));
@@ -86,8 +89,10 @@ EdgeCollapseOptions edge_collapse_options(Stop stop, const Values& values,
 }
 
 PointSetOptions point_set_options(Method method, const Values& values, const MethodFrame& frame) {
-  PointSetOptions options{
-      .method = point_set_method(method), .height_step_m = frame.height_step_m, .seed = frame.seed};
+  PointSetOptions options{.method = point_set_method(method),
+                          .height_steps = frame.height_steps,
+                          .side_depth_m = frame.side_depth_m,
+                          .seed = frame.seed};
   values.read("p_e", options.polyline_error_m);
   values.read("p_b", options.longest_border_edge_percent);
   values.read("p_m", options.least_polyline_points);

@@ -128,24 +128,38 @@ Result<Reduction> reduction_named(const std::string& name) {
 }
 
 std::string name_of(const VoidPolicy& policy) {
-  return policy.kind == VoidPolicy::Kind::kPull ? "pull"
-                                                : fmt::format("height={}", policy.base_height_m);
+  switch (policy.kind) {
+    case VoidPolicy::Kind::kHeight:
+      return fmt::format("height={}", policy.base_height_m);
+    case VoidPolicy::Kind::kOmit:
+      return "omit";
+    case VoidPolicy::Kind::kPull:
+      break;
+  }
+  return policy.fade_m > 0 ? fmt::format("pull={}", policy.fade_m) : "pull";
 }
 
 Result<VoidPolicy> void_policy_named(const std::string& name) {
   if (name == "pull") return VoidPolicy{};
-  const std::string prefix = "height=";
-  double height_m = 0;
-  const char* end = name.data() + name.size();
-  if (name.starts_with(prefix)) {
-    const auto [stop, code] = std::from_chars(name.data() + prefix.size(), end, height_m);
-    if (code == std::errc() && stop == end && std::abs(height_m) <= 20000) {
-      return VoidPolicy{.kind = VoidPolicy::Kind::kHeight, .base_height_m = height_m};
-    }
+  if (name == "omit") return VoidPolicy{.kind = VoidPolicy::Kind::kOmit};
+  const auto value_after = [&name](const std::string& prefix) -> std::optional<double> {
+    if (!name.starts_with(prefix)) return std::nullopt;
+    double value = 0;
+    const char* end = name.data() + name.size();
+    const auto [stop, code] = std::from_chars(name.data() + prefix.size(), end, value);
+    if (code != std::errc() || stop != end) return std::nullopt;
+    return value;
+  };
+  if (const auto height_m = value_after("height="); height_m && std::abs(*height_m) <= 20000) {
+    return VoidPolicy{.kind = VoidPolicy::Kind::kHeight, .base_height_m = *height_m};
   }
-  return Error{fmt::format(
-      "\"{}\" is no way to fill voids; choose pull or height=H with H in metres (-20000..20000)",
-      name)};
+  if (const auto fade_m = value_after("pull="); fade_m && *fade_m >= 0.001 && *fade_m <= 1e7) {
+    return VoidPolicy{.fade_m = *fade_m};
+  }
+  return Error{
+      fmt::format("\"{}\" is no way to fill voids; choose pull, pull=D with D in metres "
+                  "(0.001..10000000), height=H with H in metres (-20000..20000), or omit",
+                  name)};
 }
 
 std::optional<double> Recipe::error_bound_m(std::int32_t zoom) const {
@@ -161,10 +175,21 @@ ParameterValues Recipe::parameters_at(std::int32_t zoom) const {
   return values;
 }
 
-MethodOptions Recipe::options_for(const TileKey& key) const {
+double Recipe::side_depth_m(std::int32_t zoom) const {
+  return tolerance_m[static_cast<std::size_t>(zoom)] / 4;
+}
+
+HeightSteps Recipe::steps_for(std::int32_t zoom, std::span<const float> heights_m) const {
+  const auto at = static_cast<std::size_t>(zoom);
+  const auto [low, high] = std::minmax_element(heights_m.begin(), heights_m.end());
+  return tile_steps(height_step_m[at], tolerance_m[at],
+                    static_cast<double>(*high) - static_cast<double>(*low));
+}
+
+MethodOptions Recipe::options_for(const TileKey& key, const HeightSteps& steps) const {
   return method_options(
       method, stop, parameters_at(key.zoom),
-      {.height_step_m = height_step_m[static_cast<std::size_t>(key.zoom)], .seed = packed(key)});
+      {.height_steps = steps, .side_depth_m = side_depth_m(key.zoom), .seed = packed(key)});
 }
 
 std::string write_recipe(const Recipe& recipe) {
@@ -178,6 +203,7 @@ std::string write_recipe(const Recipe& recipe) {
       {"resampling", name_of(recipe.resampling)},
       {"reduce", name_of(recipe.reduction)},
       {"nodata", name_of(recipe.voids)},
+      {"nodata_base_zoom", recipe.voids.base_zoom},
       {"method", name_of(recipe.method)},
       {"tolerance_m", recipe.tolerance_m},
       {"height_step_m", recipe.height_step_m},
@@ -201,6 +227,10 @@ Result<Recipe> parse_recipe(const std::string& text) {
   read_named(object, "resampling", resampling_named, recipe.resampling, problem);
   read_named(object, "reduce", reduction_named, recipe.reduction, problem);
   read_named(object, "nodata", void_policy_named, recipe.voids, problem);
+  // Sets of earlier versions have none; their voids, which this decides, are never measured.
+  if (object.contains("nodata_base_zoom")) {
+    read_member(object, "nodata_base_zoom", recipe.voids.base_zoom, problem);
+  }
   read_named(object, "method", method_named, recipe.method, problem);
   read_member(object, "tolerance_m", recipe.tolerance_m, problem);
   read_member(object, "height_step_m", recipe.height_step_m, problem);
@@ -209,7 +239,8 @@ Result<Recipe> parse_recipe(const std::string& text) {
   read_member(object, "normals", recipe.normals, problem);
   if (!problem.empty()) return Error{problem};
   if (recipe.min_zoom < 0 || recipe.max_zoom < recipe.min_zoom ||
-      recipe.sampling_zoom < recipe.max_zoom || recipe.sampling_zoom > kMaxZoom) {
+      recipe.sampling_zoom < recipe.max_zoom || recipe.sampling_zoom > kMaxZoom ||
+      recipe.voids.base_zoom < 0 || recipe.voids.base_zoom > kMaxZoom) {
     return Error{"the recipe's zooms do not fit together"};
   }
   const auto zooms = static_cast<std::size_t>(recipe.max_zoom) + 1;

@@ -79,7 +79,8 @@ RunRecord::RunRecord(fs::path folder, std::unique_ptr<Journal> journal)
 
 RunRecord::~RunRecord() {
   try {
-    if (!is_kept_ && !is_worth_keeping() && !has_begun_output()) remove_folder();
+    const bool is_worthless = is_discarded_ || !is_worth_keeping();
+    if (!is_kept_ && is_worthless && !has_begun_output()) remove_folder();
   } catch (const std::exception&) {
     // The folder cannot even be listed: left as it is.
   }

@@ -65,6 +65,8 @@ class RunRecord {
   // REQUIRES: the tiles, and the borders that later ones need, are on disk.
   void add_tiles(const TileCheckpoint& checkpoint);
 
+  // What is in the folder is worth nothing, unless an earlier run has left it.
+  void discard() { is_discarded_ = !resumes_; }
   // True when another run would go on from here instead of starting again.
   bool is_worth_keeping() const;
   // The run in the folder, if there is one, has neither finished nor said that it is kept.
@@ -86,6 +88,7 @@ class RunRecord {
   std::unique_ptr<Journal> journal_;
   bool resumes_ = false;
   bool is_kept_ = false;
+  bool is_discarded_ = false;
   bool is_output_ours_ = false;
   std::filesystem::path output_;  // once it is open
   // The number of lattice segments when the zoom was finished.

@@ -22,6 +22,7 @@
 #include "formats/source_block_cache.h"
 #include "formats/tiered_lattice_store.h"
 #include "pipeline/block_cover.h"
+#include "pipeline/data_rim.h"
 #include "pipeline/sampling_order.h"
 #include "pipeline/stopwatch.h"
 #include "scheduler/check.h"
@@ -204,6 +205,8 @@ SurveyedTile Surveyor::examine(const TileKey& key) const {
       ++tile.valid_posts;
     }
   }
+  const bool is_full = tile.valid_posts == kTilePosts * kTilePosts;
+  if (tile.valid_posts > 0 && !is_full) tile.rim_m = rim_of(lattice, window, heights_m);
   return tile;
 }
 

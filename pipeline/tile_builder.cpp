@@ -4,6 +4,7 @@
 
 #include "scheduler/check.h"
 #include "stages/border_line.h"
+#include "stages/curvature.h"
 #include "stages/mesh_order.h"
 #include "stages/normals.h"
 #include "stages/quantize.h"
@@ -20,13 +21,16 @@ std::uint64_t hash_of(const TileKey& key, std::span<const std::uint8_t> bytes) {
 }
 
 BorderMask meridian_border(const PostGrid& grid, std::span<const float> heights_m,
-                           double tolerance_m, double step_m) {
+                           double tolerance_m, double side_depth_m, double step_m) {
   std::array<float, kTilePosts> line_m{};
   for (std::int32_t k = 0; k < kTilePosts; ++k) {
     line_m[static_cast<std::size_t>(k)] =
         heights_m[static_cast<std::size_t>(tile_post_index(0, k))];
   }
-  return simplify_border(grid.v_exact, line_m, tolerance_m, step_m);
+  BorderMask border = simplify_border(grid.v_exact, line_m, tolerance_m, step_m);
+  const std::int32_t stride = side_stride_posts(grid, Side::kWest, side_depth_m);
+  for (std::int32_t k = 0; k <= kTileIntervals; k += stride) border.set(k);
+  return border;
 }
 
 }  // namespace
@@ -44,6 +48,7 @@ void TileBuilder::read_window(TileWork& work) const {
     std::copy_n(work.window.heights_m.begin() + from, kTilePosts, work.heights_m.begin() + to);
     std::copy_n(work.window.valid.begin() + from, kTilePosts, work.valid.begin() + to);
   }
+  work.steps = recipe_.steps_for(work.key.zoom, work.heights_m);
 }
 
 void TileBuilder::simplify(TileWork& work, FixedBorders fixed, const PlannedTile& planned) const {
@@ -51,18 +56,18 @@ void TileBuilder::simplify(TileWork& work, FixedBorders fixed, const PlannedTile
   const auto zoom = static_cast<std::size_t>(work.key.zoom);
   for (const Side side : kSides) {
     if (planned.roles[index_of(side)] == SideRole::kSelf) {
-      fixed[index_of(side)] = meridian_border(*work.grid, work.heights_m, recipe_.tolerance_m[zoom],
-                                              recipe_.height_step_m[zoom]);
+      fixed[index_of(side)] =
+          meridian_border(*work.grid, work.heights_m, recipe_.tolerance_m[zoom],
+                          recipe_.side_depth_m(work.key.zoom), work.steps.side_m);
     }
   }
-  const MethodOptions options = recipe_.options_for(work.key);
+  const MethodOptions options = recipe_.options_for(work.key, work.steps);
   work.tin = strip_ordered(qmpipe::simplify(*work.grid, work.heights_m, fixed, options));
 }
 
 void TileBuilder::finish(TileWork& work) const {
   const StageClock clock(work, Stage::kFinish);
-  const double step_m = recipe_.height_step_m[static_cast<std::size_t>(work.key.zoom)];
-  work.mesh = quantize(*work.grid, work.tin, step_m);
+  work.mesh = quantize(*work.grid, work.tin, work.steps);
   if (recipe_.normals) {
     work.mesh.normals =
         tile_normals(heightfield_.scheme(), work.key, *work.grid, work.window, work.tin.vertices);

@@ -32,6 +32,7 @@ struct TileWork {
   WindowHeights window;          // with a halo of one post
   std::vector<float> heights_m;  // the tile's own 257 x 257 posts
   std::vector<std::uint8_t> valid;
+  HeightSteps steps;
   Tin tin;
   QuantizedMesh mesh;
   std::vector<std::uint8_t> bytes;  // as stored

@@ -189,7 +189,7 @@ class Aim {
     ++attempts_;
     MethodOptions options =
         method_options(method_.method, method_.stop, values,
-                       {.height_step_m = height_step_m_, .curvature = Curvature::kIgnored});
+                       {.height_steps = height_step_m_, .curvature = Curvature::kIgnored});
     if (auto* const greedy = std::get_if<GreedyOptions>(&options);
         greedy != nullptr && target_.most_triangles) {
       // It may go one beyond.

@@ -15,6 +15,7 @@
 #include "formats/foreign_crs.h"
 #include "pipeline/recipe.h"
 #include "pipeline/verify_borders.h"
+#include "pipeline/verify_outside.h"
 #include "pipeline/verify_set.h"
 #include "pipeline/verify_source.h"
 #include "pipeline/verify_tile.h"
@@ -75,6 +76,8 @@ class Verification {
   TileOutcome examine(const TileKey& key) const;
   void measure(const QuantizedMesh& mesh, TileOutcome& outcome) const;
   void judge_error(TileOutcome& outcome) const;
+  void judge_outside(const QuantizedMesh& mesh, std::span<const std::uint8_t> valid,
+                     TileOutcome& outcome) const;
   void compare_with_neighbours(const std::vector<TileOutcome>& row_below,
                                std::vector<TileOutcome>& batch);
   void collect(TileOutcome& outcome, ZoomReport& zoom);
@@ -232,6 +235,7 @@ void Verification::measure(const QuantizedMesh& mesh, TileOutcome& outcome) cons
   outcome.error = measure_error(grid, mesh, posts->heights_m, posts->valid);
   judge_error(outcome);
   const bool has_voids = std::count(posts->valid.begin(), posts->valid.end(), 0) > 0;
+  if (has_voids) judge_outside(mesh, posts->valid, outcome);
   if (options_.hausdorff == HausdorffMode::kMeasured && !has_voids && mesh.triangle_count() > 0) {
     outcome.hausdorff = tile_hausdorff(layer_.scheme, outcome.key, mesh, posts->heights_m);
   }
@@ -251,6 +255,33 @@ void Verification::judge_error(TileOutcome& outcome) const {
                        grid.longitude_deg[static_cast<std::size_t>(error.worst.i)],
                        grid.latitude_deg[static_cast<std::size_t>(error.worst.j)], error.worst.i,
                        error.worst.j, error.largest_m, *tolerance_m)});
+}
+
+// Only where the recipe promises something: a height that somebody wants outside the data may be a cliff.
+void Verification::judge_outside(const QuantizedMesh& mesh, std::span<const std::uint8_t> valid,
+                                 TileOutcome& outcome) const {
+  const TileKey& key = outcome.key;
+  const std::optional<double> tolerance_m = source_->tolerance_m(key.zoom);
+  if (!recipe_ || !tolerance_m || recipe_->voids.kind == VoidPolicy::Kind::kHeight) return;
+  const auto adopt = [&outcome](std::vector<Finding> findings) {
+    std::move(findings.begin(), findings.end(), std::back_inserter(outcome.findings));
+  };
+  const TileOutside tile = {.key = key, .mesh = mesh, .valid = valid, .tolerance_m = *tolerance_m};
+  if (recipe_->voids.fade_m == 0) {
+    adopt(find_cliff(layer_.scheme, tile, source_->relief_near_m(key)));
+  }
+  if (key.zoom <= std::max(recipe_->voids.base_zoom, recipe_->min_zoom)) return;
+  const auto stored = tile_set_.read(parent_of(key));
+  if (!stored) return;
+  const auto plain = plain_tile_bytes(*stored);
+  if (!plain) return;
+  const Result<QuantizedMesh> parent = decode(*plain);
+  if (!parent || !has_usable_heights(*parent)) return;
+  adopt(find_levels_apart(layer_.scheme, tile,
+                          {.key = parent_of(key),
+                           .mesh = *parent,
+                           .valid = {},
+                           .tolerance_m = source_->tolerance_m(key.zoom - 1).value_or(0)}));
 }
 
 void Verification::compare_with_neighbours(const std::vector<TileOutcome>& row_below,

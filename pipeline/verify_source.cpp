@@ -8,10 +8,12 @@
 #include <utility>
 
 #include "formats/raster_source.h"
+#include "pipeline/build_plan.h"
 #include "pipeline/estimate.h"
 #include "pipeline/memory_share.h"
 #include "pipeline/scratch_folder.h"
 #include "pipeline/survey.h"
+#include "stages/height_step.h"
 #include "stages/sampling.h"
 
 namespace qmpipe {
@@ -33,11 +35,33 @@ class SurveyedPosts final : public SourcePosts {
   std::optional<double> tolerance_m(std::int32_t zoom) const override {
     return recipe_.error_bound_m(zoom);
   }
+  double relief_near_m(const TileKey& key) const override {
+    const auto& tiles = survey_.tiles[static_cast<std::size_t>(key.zoom)];
+    const std::int32_t columns = survey_.scheme.columns(key.zoom);
+    std::optional<HeightSpan> heights;
+    for (std::int32_t k = 0; k < 9; ++k) {
+      const TileKey near = {
+          .zoom = key.zoom, .x = (key.x + k % 3 - 1 + columns) % columns, .y = key.y + k / 3 - 1};
+      const auto found = std::lower_bound(
+          tiles.begin(), tiles.end(), near,
+          [](const SurveyedTile& tile, const TileKey& wanted) { return tile.key < wanted; });
+      if (found == tiles.end() || found->key != near) continue;
+      const HeightSpan own = {.low_m = static_cast<double>(found->lowest_m),
+                              .high_m = static_cast<double>(found->highest_m)};
+      if (heights) {
+        heights->include(own);
+      } else {
+        heights = own;
+      }
+    }
+    return heights ? heights->range_m() : 0;
+  }
   std::vector<TileKey> expected_tiles() const override {
     std::vector<TileKey> keys;
     for (const std::vector<SurveyedTile>& zoom : survey_.tiles) {
       for (const SurveyedTile& tile : zoom) {
-        if (tile.key.zoom >= recipe_.min_zoom) keys.push_back(tile.key);
+        if (tile.key.zoom < recipe_.min_zoom) continue;
+        if (is_wanted(recipe_.voids, survey_.scheme, tile)) keys.push_back(tile.key);
       }
     }
     return keys;
@@ -72,6 +96,7 @@ class SampledPosts final : public SourcePosts {
     return heights;
   }
   std::optional<double> tolerance_m(std::int32_t) const override { return std::nullopt; }
+  double relief_near_m(const TileKey& /*key*/) const override { return 0; }
   std::vector<TileKey> expected_tiles() const override { return {}; }
 
  private:

@@ -27,6 +27,8 @@ class SourcePosts {
   // than the recipe's sampling zoom. Throws IoError when the source cannot be read.
   virtual std::optional<WindowHeights> posts(const TileKey& key) const = 0;
   virtual std::optional<double> tolerance_m(std::int32_t zoom) const = 0;
+  // The height range of the valid posts of a tile and of the eight around it; 0 without a recipe.
+  virtual double relief_near_m(const TileKey& key) const = 0;
   // Tiles that the recipe asks for and the source has data for, sorted; empty without a recipe.
   virtual std::vector<TileKey> expected_tiles() const = 0;
 };

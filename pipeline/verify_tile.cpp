@@ -20,6 +20,9 @@ namespace {
 constexpr std::size_t kVertexCountAt = 88;
 // An occlusion point this far out, in radii, stands for one at infinity.
 constexpr double kAsGoodAsInfinite = 1e5;
+// A tile's heights that are many metres apart, and those that are so few that it does not matter.
+constexpr double kManyHeightsM = 100;
+constexpr double kFewHeightsM = 2;
 // Sine of the angle by which a two-byte normal may miss the horizon.
 constexpr double kHorizonSlack = 0.02;
 
@@ -188,11 +191,13 @@ bool MeshCheck::check_heights() {
   return true;
 }
 
-// Only half of the upper range may stay unused: that much the steps of DESIGN 5.4 can cost.
+// Heights on steps that neighbours share leave some of the range unused: of a tile of over 100 m less
+// than 15 % of its own, of a flatter one less than half.
 void MeshCheck::warn_of_loose_range() {
   const auto [lowest, highest] = std::minmax_element(mesh_.h.begin(), mesh_.h.end());
-  if (header_.min_height_m == header_.max_height_m) return;
-  if (*lowest == 0 && *highest > kQuantizedMax / 2) return;
+  const double header_m = static_cast<double>(header_.max_height_m) - header_.min_height_m;
+  const double used_m = header_m * (*highest - *lowest) / kQuantizedMax;
+  if (header_m <= (used_m > kManyHeightsM ? 1.15 : 2) * used_m + kFewHeightsM) return;
   add(FindingKind::kLooseHeightRange,
       fmt::format("the vertices use {}..{} of 0..32767: the header's range from {} m to {} m is "
                   "wider than the tile's, which costs precision and early refinement",

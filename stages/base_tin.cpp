@@ -12,12 +12,12 @@ class BaseTin {
  public:
   BaseTin(const PostGrid& grid, std::span<const float> heights_m) : grid_(grid), h_(heights_m) {}
 
-  Tin build(const FixedBorders& fixed, double height_step_m) {
+  Tin build(const FixedBorders& fixed, const HeightSteps& height_steps) {
     const bool any_fixed = std::any_of(fixed.begin(), fixed.end(), [](const auto& m) { return m; });
     const std::int32_t ring = any_fixed ? 1 : 0;
     QMPIPE_CHECK(!any_fixed ||
                  (grid_.width_posts == kTilePosts && grid_.height_posts == kTilePosts));
-    number_vertices(fixed, height_step_m);
+    number_vertices(fixed, height_steps);
     for (std::int32_t j = ring; j + 1 + ring < grid_.height_posts; ++j) {
       for (std::int32_t i = ring; i + 1 + ring < grid_.width_posts; ++i) add_cell(i, j);
     }
@@ -28,7 +28,7 @@ class BaseTin {
   }
 
  private:
-  void number_vertices(const FixedBorders& fixed, double height_step_m) {
+  void number_vertices(const FixedBorders& fixed, const HeightSteps& height_steps) {
     std::vector<std::uint8_t> absent(grid_.post_count(), 0);
     for (const Side side : kSides) {
       const auto& mask = fixed[index_of(side)];
@@ -45,7 +45,7 @@ class BaseTin {
       }
       number_[post] = static_cast<std::uint32_t>(tin_.vertices.size());
       tin_.vertices.push_back(
-          vertex_at_post(grid_, static_cast<std::int32_t>(post), h_[post], height_step_m));
+          vertex_at_post(grid_, static_cast<std::int32_t>(post), h_[post], height_steps));
     }
     tin_.indices.reserve(6 * tin_.vertices.size());
   }
@@ -118,9 +118,9 @@ class BaseTin {
 }  // namespace
 
 Tin base_tin(const PostGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
-             double height_step_m) {
+             const HeightSteps& height_steps) {
   QMPIPE_CHECK(heights_m.size() == grid.post_count());
-  return BaseTin(grid, heights_m).build(fixed, height_step_m);
+  return BaseTin(grid, heights_m).build(fixed, height_steps);
 }
 
 }  // namespace qmpipe

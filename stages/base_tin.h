@@ -13,6 +13,6 @@ namespace qmpipe {
 // when they are equal), a strip along a side by its shorter diagonals.
 // REQUIRES: grid.post_count() heights; fixed borders only for a tile's 257 x 257 posts.
 Tin base_tin(const PostGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
-             double height_step_m);
+             const HeightSteps& height_steps);
 
 }  // namespace qmpipe

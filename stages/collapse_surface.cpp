@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "scheduler/check.h"
-#include "stages/height_step.h"
+#include "stages/curvature.h"
 
 namespace qmpipe {
 namespace {
@@ -21,20 +21,37 @@ CollapseSurface::HeightRange CollapseSurface::height_range(const Tin& tin) {
 }
 
 CollapseSurface::CollapseSurface(const PostGrid& grid, const Tin& tin, const FixedBorders& fixed,
-                                 double height_step_m, const CollapseWeights& weights)
+                                 const HeightSteps& height_steps, double side_depth_m,
+                                 const CollapseWeights& weights)
     : grid_(grid),
       weights_(weights),
-      height_step_m_(height_step_m),
+      height_steps_(height_steps),
       heights_(height_range(tin)),
       mesh_(tin.indices, tin.vertices.size()),
       vertices_(tin.vertices) {
-  QMPIPE_CHECK(height_step_m > 0);
+  QMPIPE_CHECK(height_steps.inner_m > 0);
   scale_ = {1.0 / grid.u_max(), 1.0 / grid.v_max(),
             heights_.high_m > heights_.low_m ? 1 / (heights_.high_m - heights_.low_m) : 0.0};
   for (const Side side : kSides) {
     if (fixed[index_of(side)]) fixed_sides_ |= bit(side);
+    strides_[index_of(side)] = std::isinf(side_depth_m)
+                                   ? grid.width_posts + grid.height_posts
+                                   : side_stride_posts(grid, side, side_depth_m);
   }
   start();
+}
+
+bool CollapseSurface::is_pinned(Index v) const {
+  const std::uint8_t sides = sides_[at(v)];
+  if ((sides & (sides - 1U)) != 0) return true;
+  for (const Side side : kSides) {
+    if ((sides & bit(side)) == 0) continue;
+    const std::int32_t post = vertices_[at(v)].post;
+    const bool is_vertical = side == Side::kWest || side == Side::kEast;
+    const std::int32_t along = is_vertical ? grid_.row(post) : grid_.column(post);
+    return along % strides_[index_of(side)] == 0;
+  }
+  return false;
 }
 
 void CollapseSurface::start() {
@@ -134,7 +151,7 @@ TinVertex CollapseSurface::rounded(const Vector3& place) const {
   return {.u = units(place.x, grid_.u_max()),
           .v = units(place.y, grid_.v_max()),
           .post = kNoPost,
-          .height_m = snapped_height(height_m, height_step_m_)};
+          .height_m = snapped_height(height_m, height_steps_.inner_m)};
 }
 
 std::optional<CollapseSurface::Plan> CollapseSurface::plan(Index e) const {
@@ -145,7 +162,7 @@ std::optional<CollapseSurface::Plan> CollapseSurface::plan(Index e) const {
   if (on_a != 0 && on_b != 0) {
     // A chord through the inside would pinch the tile, and a fixed side is another tile's.
     const bool is_fixed = (on_a & on_b & fixed_sides_) != 0;
-    if (!mesh_.on_hull(e) || is_fixed || (is_corner(a) && is_corner(b))) return std::nullopt;
+    if (!mesh_.on_hull(e) || is_fixed || (is_pinned(a) && is_pinned(b))) return std::nullopt;
   }
   const EdgeQuadric sums = quadric(e);
   if (on_a == 0 && on_b == 0) {
@@ -154,8 +171,8 @@ std::optional<CollapseSurface::Plan> CollapseSurface::plan(Index e) const {
     const Vector3 place = places_[at(a)] + *offset;
     return Plan{.place = place, .kept = kNone, .cost = cost_of(e, sums, place)};
   }
-  if (on_b == 0 || is_corner(a)) return keeping(e, sums, a);
-  if (on_a == 0 || is_corner(b)) return keeping(e, sums, b);
+  if (on_b == 0 || is_pinned(a)) return keeping(e, sums, a);
+  if (on_a == 0 || is_pinned(b)) return keeping(e, sums, b);
   const Plan keep_a = keeping(e, sums, a);
   const Plan keep_b = keeping(e, sums, b);
   if (keep_a.cost != keep_b.cost) return keep_a.cost < keep_b.cost ? keep_a : keep_b;

@@ -8,6 +8,7 @@
 // that are multiples of the step within the range of the first TIN's.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -32,9 +33,11 @@ class CollapseSurface {
     double cost = 0;
   };
 
+  // Free sides keep the posts that side_stride_posts() asks for with this depth.
   // REQUIRES: a TIN of the grid's rectangle with the fixed sides' vertices.
   CollapseSurface(const PostGrid& grid, const Tin& tin, const FixedBorders& fixed,
-                  double height_step_m, const CollapseWeights& weights);
+                  const HeightSteps& height_steps, double side_depth_m,
+                  const CollapseWeights& weights);
 
   const CollapseMesh& mesh() const { return mesh_; }
   const TinVertex& vertex(Index v) const { return vertices_[at(v)]; }
@@ -74,7 +77,8 @@ class CollapseSurface {
     return {vertex.u * scale_.x, vertex.v * scale_.y,
             (vertex.height_m - heights_.low_m) * scale_.z};
   }
-  bool is_corner(Index v) const { return (sides_[at(v)] & (sides_[at(v)] - 1U)) != 0; }
+  // A corner, or a post without which a side's chord would sink too deep.
+  bool is_pinned(Index v) const;
   void start();
   void update_sums(Index v);
   // Adds what v contributes to its neighbours' sums, `other`'s excepted: factor 1, or -1 to take it out.
@@ -95,7 +99,8 @@ class CollapseSurface {
 
   const PostGrid& grid_;
   CollapseWeights weights_;
-  double height_step_m_;
+  HeightSteps height_steps_;
+  std::array<std::int32_t, 4> strides_{};  // in posts, by side
   HeightRange heights_;
   Vector3 scale_;  // from units and metres to the scaled coordinates of section 4.4.1
   CollapseMesh mesh_;

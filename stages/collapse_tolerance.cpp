@@ -9,11 +9,12 @@ constexpr std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
 CollapseTolerance::CollapseTolerance(const PostGrid& grid, std::span<const float> heights_m,
-                                     double tolerance_m, double height_step_m, Curvature curvature,
-                                     const CollapseSurface& surface, const FixedBorders& fixed)
+                                     double tolerance_m, const HeightSteps& height_steps,
+                                     Curvature curvature, const CollapseSurface& surface,
+                                     const FixedBorders& fixed)
     : grid_(grid),
       surface_(surface),
-      errors_(grid, heights_m, tolerance_m, height_step_m, curvature),
+      errors_(grid, heights_m, tolerance_m, height_steps, curvature),
       blocked_(grid.post_count(), 0) {
   for (Index v = 0; v < surface.mesh().vertex_count(); ++v) {
     blocked_[at(surface.vertex(v).post)] = 1;

@@ -22,8 +22,8 @@ class CollapseTolerance {
 
   // REQUIRES: those of PostErrors; `surface` outlives this.
   CollapseTolerance(const PostGrid& grid, std::span<const float> heights_m, double tolerance_m,
-                    double height_step_m, Curvature curvature, const CollapseSurface& surface,
-                    const FixedBorders& fixed);
+                    const HeightSteps& height_steps, Curvature curvature,
+                    const CollapseSurface& surface, const FixedBorders& fixed);
 
   bool allows(Index e, const Candidate& candidate);
   // To be told of a collapse before it is made.

@@ -36,6 +36,30 @@ CurvatureTerms curvature_terms(const PostGrid& grid) {
   return terms;
 }
 
+std::int32_t side_stride_posts(const PostGrid& grid, Side side, double deepest_m) {
+  std::int32_t stride = kTileIntervals;
+  if (!grid.on_globe()) return stride;
+  double widest_rad = 0;
+  if (side == Side::kWest || side == Side::kEast) {
+    // A mercator tile's rows are farther apart at its end towards the equator.
+    for (std::size_t j = 1; j < grid.latitude_deg.size(); ++j) {
+      const double apart_deg = grid.latitude_deg[j] - grid.latitude_deg[j - 1];
+      widest_rad = std::max(widest_rad, apart_deg * kRadPerDeg);
+    }
+  } else {
+    const double latitude_deg =
+        side == Side::kSouth ? grid.latitude_deg.front() : grid.latitude_deg.back();
+    const double width_deg = grid.longitude_deg.back() - grid.longitude_deg.front();
+    widest_rad = width_deg * kRadPerDeg / kTileIntervals * std::sqrt(cos_squared_deg(latitude_deg));
+  }
+  const auto depth_m = [widest_rad](std::int32_t posts) {
+    const double angle_rad = widest_rad * posts;
+    return kEquatorialRadiusM / 8 * angle_rad * angle_rad;
+  };
+  while (stride > 1 && depth_m(stride) > deepest_m) stride /= 2;
+  return stride;
+}
+
 double largest_sagitta_m(const PostGrid& grid) {
   if (!grid.on_globe()) return 0;
   const double width_rad = (grid.longitude_deg.back() - grid.longitude_deg.front()) * kRadPerDeg;

@@ -46,6 +46,10 @@ struct CurvatureTerms {
 // REQUIRES: the grid of a tile.
 CurvatureTerms curvature_terms(const PostGrid& grid);
 
+// How many posts a chord of a side may span, a power of two of at most 256, to sink no deeper than this
+// below the globe; 1 where no chord is as shallow. 256 on a plane. REQUIRES: the grid of a tile.
+std::int32_t side_stride_posts(const PostGrid& grid, Side side, double deepest_m);
+
 // The depth of the tile's longest chord in metres: an upper bound for any triangle in it.
 // 0 on a plane.
 double largest_sagitta_m(const PostGrid& grid);

@@ -25,13 +25,13 @@ class EdgeCollapse {
   EdgeCollapse(const PostGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
                const EdgeCollapseOptions& options)
       : options_(options),
-        surface_(grid, base_tin(grid, heights_m, fixed, options.height_step_m), fixed,
-                 options.height_step_m,
+        surface_(grid, base_tin(grid, heights_m, fixed, options.height_steps), fixed,
+                 options.height_steps, options.side_depth_m,
                  {.volume = options.volume_weight,
                   .boundary = options.boundary_weight,
                   .shape = options.shape_weight}) {
     if (options.tolerance_m) {
-      tolerance_.emplace(grid, heights_m, *options.tolerance_m, options.height_step_m,
+      tolerance_.emplace(grid, heights_m, *options.tolerance_m, options.height_steps,
                          options.curvature, surface_, fixed);
     }
     start_round();

@@ -15,6 +15,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -25,9 +26,11 @@ namespace qmpipe {
 
 struct EdgeCollapseOptions {
   // Vertex heights are multiples of this (DESIGN 5.4).
-  double height_step_m = 0;
+  HeightSteps height_steps;
+  // How deep a chord of a free side may sink below the globe.
+  double side_depth_m = std::numeric_limits<double>::infinity();
   // Keeps every post within this of the surface; none: least_edges alone decides.
-  // REQUIRES: > height_step_m / 2.
+  // REQUIRES: > height_steps.side_m / 2.
   std::optional<double> tolerance_m = std::nullopt;
   Curvature curvature = Curvature::kCounts;
   // The paper's e_e: stops when the TIN has fewer edges than this; 0: not by number.

@@ -1,9 +1,11 @@
 #include "stages/greedy.h"
 
 #include <algorithm>
+#include <cmath>
 #include <queue>
 
 #include "scheduler/check.h"
+#include "stages/curvature.h"
 #include "stages/delaunay.h"
 
 namespace qmpipe {
@@ -56,15 +58,14 @@ GreedyInsertion::GreedyInsertion(const PostGrid& grid, std::span<const float> he
     : grid_(grid),
       heights_m_(heights_m),
       options_(options),
-      errors_(grid, heights_m, options.tolerance_m, options.height_step_m, options.curvature),
+      errors_(grid, heights_m, options.tolerance_m, options.height_steps, options.curvature),
       mesh_({grid.u_max(), grid.v_max()}),
       blocked_(grid.post_count(), 0) {
   insert_initial_vertices(fixed);
 }
 
 void GreedyInsertion::insert_post(std::int32_t post, Index near) {
-  const TinVertex vertex =
-      vertex_at_post(grid_, post, heights_m_[at(post)], options_.height_step_m);
+  const TinVertex vertex = vertex_at_post(grid_, post, heights_m_[at(post)], options_.height_steps);
   const Index inserted = mesh_.insert({vertex.u, vertex.v}, near);
   blocked_[at(post)] = 1;
   if (inserted != static_cast<Index>(vertices_.size())) return;  // was a vertex before
@@ -77,7 +78,7 @@ void GreedyInsertion::insert_initial_vertices(const FixedBorders& fixed) {
   // The triangulation begins with these four, in this order.
   for (const std::int32_t post : {grid_.index(0, 0), grid_.index(i_end, 0),
                                   grid_.index(i_end, j_end), grid_.index(0, j_end)}) {
-    vertices_.push_back(vertex_at_post(grid_, post, heights_m_[at(post)], options_.height_step_m));
+    vertices_.push_back(vertex_at_post(grid_, post, heights_m_[at(post)], options_.height_steps));
     blocked_[at(post)] = 1;
   }
   const auto last = [this] { return mesh_.touched().empty() ? 0 : mesh_.touched().back(); };
@@ -90,6 +91,14 @@ void GreedyInsertion::insert_initial_vertices(const FixedBorders& fixed) {
       const Post p = side_post(side, k);
       if (mask->test(k)) insert_post(grid_.index(p.i, p.j), last());
       blocked_[at(grid_.index(p.i, p.j))] = 1;
+    }
+  }
+  for (const Side side : kSides) {
+    if (fixed[index_of(side)] || std::isinf(options_.side_depth_m)) continue;
+    const std::int32_t stride = side_stride_posts(grid_, side, options_.side_depth_m);
+    for (std::int32_t k = stride; k < kTileIntervals; k += stride) {
+      const Post p = side_post(side, k);
+      insert_post(grid_.index(p.i, p.j), last());
     }
   }
   const std::int32_t cells = options_.initial_grid_cells;

@@ -47,19 +47,21 @@ WindowHeights Heightfield::window(std::int32_t zoom, const PostWindow& window) c
   for (std::size_t k = 0; k < result.valid.size(); ++k) {
     result.valid[k] = std::isnan(result.heights_m[k]) ? 0 : 1;
   }
-  const std::int32_t levels =
-      policy_.kind == VoidPolicy::Kind::kPull ? std::min(policy_.pull_levels, zoom) : 0;
-  fill(lattice, window, levels, result.heights_m);
+  fill(lattice, window, result.heights_m);
   return result;
 }
 
-void Heightfield::fill(const Lattice& lattice, const PostWindow& window, std::int32_t levels,
+std::int32_t Heightfield::coarsest_for(std::int32_t zoom) const {
+  return policy_.kind == VoidPolicy::Kind::kHeight ? zoom : std::min(policy_.base_zoom, zoom);
+}
+
+void Heightfield::fill(const Lattice& lattice, const PostWindow& window,
                        std::vector<float>& heights_m) const {
   // First: a window without voids shows the same pole as one with them.
-  fill_pole_rows(lattice, window, levels, heights_m);
+  fill_pole_rows(lattice, window, heights_m);
   if (!any_void(heights_m)) return;
   const auto base_m = static_cast<float>(policy_.base_height_m);
-  if (levels == 0) {
+  if (lattice.zoom() == coarsest_for(lattice.zoom())) {
     std::replace_if(
         heights_m.begin(), heights_m.end(), [](float h) { return std::isnan(h); }, base_m);
     return;
@@ -68,7 +70,7 @@ void Heightfield::fill(const Lattice& lattice, const PostWindow& window, std::in
   const PostWindow around = coarser_window(window);
   std::vector<float> pulled_m(around.size());
   store_.read(coarser, around, pulled_m);
-  fill(coarser, around, levels - 1, pulled_m);
+  fill(coarser, around, pulled_m);
   for (std::int64_t j = window.j0; j < window.j0 + window.height_posts; ++j) {
     for (std::int64_t i = window.i0; i < window.i0 + window.width_posts; ++i) {
       float& height_m = heights_m[position(window, i, j)];
@@ -82,9 +84,9 @@ void Heightfield::fill(const Lattice& lattice, const PostWindow& window, std::in
   }
 }
 
-float Heightfield::pole_height_m(std::int32_t zoom, std::size_t pole, std::int32_t levels) const {
-  for (std::int32_t up = 0; up <= levels; ++up) {
-    const auto& height_m = pole_heights_.at(static_cast<std::size_t>(zoom - up))[pole];
+float Heightfield::pole_height_m(std::int32_t zoom, std::size_t pole) const {
+  for (std::int32_t from = zoom; from >= coarsest_for(zoom); --from) {
+    const auto& height_m = pole_heights_.at(static_cast<std::size_t>(from))[pole];
     if (height_m) return *height_m;
   }
   return static_cast<float>(policy_.base_height_m);
@@ -92,12 +94,12 @@ float Heightfield::pole_height_m(std::int32_t zoom, std::size_t pole, std::int32
 
 // The whole row takes one height, data or none: it is one point of the globe.
 void Heightfield::fill_pole_rows(const Lattice& lattice, const PostWindow& window,
-                                 std::int32_t levels, std::vector<float>& heights_m) const {
+                                 std::vector<float>& heights_m) const {
   for (const std::int64_t j : {std::int64_t{0}, lattice.rows() - 1}) {
     if (!lattice.is_pole_row(j) || j < window.j0 || j >= window.j0 + window.height_posts) continue;
     const auto row =
         heights_m.begin() + static_cast<std::ptrdiff_t>(position(window, window.i0, j));
-    std::fill(row, row + window.width_posts, pole_height_m(lattice.zoom(), j == 0 ? 0 : 1, levels));
+    std::fill(row, row + window.width_posts, pole_height_m(lattice.zoom(), j == 0 ? 0 : 1));
   }
 }
 

@@ -2,7 +2,8 @@
 //
 // Guarantees: a post's height is a pure function of the post, the lattice store and the void
 // policy, so two windows agree on every post they share, whatever each sees around it. Posts of a
-// pole row have one height.
+// pole row have one height. Below the policy's base zoom, a void post that is one of the coarser zoom
+// too has that zoom's height.
 // const use is safe from several threads.
 #pragma once
 
@@ -17,16 +18,21 @@ namespace qmpipe {
 
 struct VoidPolicy {
   enum class Kind {
-    // The height of the coarser zooms' valid posts, fading to base_height_m some 64 posts from the
-    // data: no cliffs, no sunken globe. DEFAULT.
+    // The heights of the coarser zooms' valid posts, fading to base_height_m: no cliffs, no sunken
+    // globe. DEFAULT.
     kPull,
     // base_height_m at once.
     kHeight,
+    // As kPull; tiles with a void are written only where a tile below them or the format needs them.
+    kOmit,
   };
   Kind kind = Kind::kPull;
   double base_height_m = 0;
-  // How many zooms `pull` looks up; the fade ends after 2^levels posts. DEFAULT: 6.
-  std::int32_t pull_levels = 6;
+  // Over which distance on the ground heights fade; 0: as far as the data's rim needs. DEFAULT: 0.
+  double fade_m = 0;
+  // The zoom at which voids are base_height_m. A void of a deeper zoom lies on the surface of the zoom
+  // above it, so that all zooms show one surface outside the data.
+  std::int32_t base_zoom = 0;
   friend bool operator==(const VoidPolicy&, const VoidPolicy&) = default;
 };
 
@@ -55,11 +61,12 @@ class Heightfield {
   const TilingScheme& scheme() const { return scheme_; }
 
  private:
-  void fill(const Lattice& lattice, const PostWindow& window, std::int32_t levels,
-            std::vector<float>& heights_m) const;
-  void fill_pole_rows(const Lattice& lattice, const PostWindow& window, std::int32_t levels,
+  void fill(const Lattice& lattice, const PostWindow& window, std::vector<float>& heights_m) const;
+  void fill_pole_rows(const Lattice& lattice, const PostWindow& window,
                       std::vector<float>& heights_m) const;
-  float pole_height_m(std::int32_t zoom, std::size_t pole, std::int32_t levels) const;
+  float pole_height_m(std::int32_t zoom, std::size_t pole) const;
+  // The coarsest zoom from which voids of this one take heights.
+  std::int32_t coarsest_for(std::int32_t zoom) const;
 
   const LatticeStore& store_;
   TilingScheme scheme_;

@@ -7,6 +7,7 @@
 #include "scheduler/check.h"
 #include "stages/base_tin.h"
 #include "stages/constrained_delaunay.h"
+#include "stages/curvature.h"
 #include "stages/height_step.h"
 #include "stages/metric_frame.h"
 #include "stages/point_subset.h"
@@ -23,7 +24,7 @@ class PointSetSimplification {
                          const FixedBorders& fixed, const PointSetOptions& options)
       : grid_(grid),
         options_(options),
-        base_(base_tin(grid, heights_m, fixed, options.height_step_m)),
+        base_(base_tin(grid, heights_m, fixed, options.height_steps)),
         heights_m_(grid.post_count(), 0.0) {
     const auto by_height = [](const TinVertex& a, const TinVertex& b) {
       return a.height_m < b.height_m;
@@ -93,7 +94,11 @@ void PointSetSimplification::add_borders(const FixedBorders& fixed) {
   for (const Side side : kSides) {
     const bool is_vertical = side == Side::kWest || side == Side::kEast;
     const double length = is_vertical ? grid_.v_max() : grid_.u_max();
-    const double longest = length * options_.longest_border_edge_percent / 100;
+    double longest = length * options_.longest_border_edge_percent / 100;
+    if (!std::isinf(options_.side_depth_m)) {
+      longest = std::min(
+          longest, length / kTileIntervals * side_stride_posts(grid_, side, options_.side_depth_m));
+    }
     polylines_.push_back({.posts = {}, .longest_edge = fixed[index_of(side)] ? 0 : longest});
     for (const TinVertex& vertex : base_.vertices) {
       if (is_on_side(vertex.post, side)) polylines_.back().posts.push_back(vertex.post);
@@ -194,7 +199,7 @@ TinVertex PointSetSimplification::vertex_near(const SurfacePoint& point,
                    .v = inside(place.v, grid_.v_max()),
                    .post = kNoPost,
                    .height_m = snapped_height(std::clamp(point.height_m, lowest_m_, highest_m_),
-                                              options_.height_step_m)};
+                                              options_.height_steps.inner_m)};
   const std::int32_t post = post_at(grid_, vertex.u, vertex.v);
   if (post == kNoPost) return vertex;
   const TinVertex at_post = vertex_at(post);
@@ -229,7 +234,7 @@ Tin PointSetSimplification::triangulated(std::vector<TinVertex> vertices) const 
 
 void check(const PointSetOptions& o) {
   const auto is_percentage = [](double x) { return x >= 0 && x <= 100; };
-  QMPIPE_CHECK(o.height_step_m > 0 && o.polyline_error_m >= 0);
+  QMPIPE_CHECK(o.height_steps.inner_m > 0 && o.polyline_error_m >= 0);
   QMPIPE_CHECK(is_percentage(o.longest_border_edge_percent));
   QMPIPE_CHECK(is_percentage(o.removed_percent) && is_percentage(o.retained_percent));
   QMPIPE_CHECK(o.cell_size_m > 0 && o.neighbour_radius_m > 0);

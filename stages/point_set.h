@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "stages/tin.h"
@@ -29,7 +30,9 @@ enum class PointSetMethod {
 struct PointSetOptions {
   PointSetMethod method = PointSetMethod::kRandom;
   // Vertex heights are multiples of this (DESIGN 5.4).
-  double height_step_m = 0;
+  HeightSteps height_steps;
+  // How deep a chord of a free side may sink below the globe.
+  double side_depth_m = std::numeric_limits<double>::infinity();
   std::uint64_t seed = 0;
   // Polylines. p_e: largest distance in metres, in space, of a removed point from the segment in its
   // place.

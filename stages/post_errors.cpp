@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "scheduler/check.h"
-#include "stages/height_step.h"
 
 namespace qmpipe {
 namespace {
@@ -22,19 +21,21 @@ PostErrors::HeightRange PostErrors::height_range(std::span<const float> heights_
 }
 
 PostErrors::PostErrors(const PostGrid& grid, std::span<const float> heights_m, double tolerance_m,
-                       double height_step_m, Curvature curvature)
+                       const HeightSteps& height_steps, Curvature curvature)
     : grid_(grid),
       units_per_column_(grid.u_exact.back() / (grid.width_posts - 1)),
-      range_(height_range(heights_m, height_step_m)),
+      range_(height_range(heights_m, height_steps.inner_m)),
       heights_(grid.post_count() + WorstPost::kOverread) {
   QMPIPE_CHECK(heights_m.size() == grid.post_count());
-  QMPIPE_CHECK(tolerance_m > height_step_m / 2);
+  QMPIPE_CHECK(tolerance_m > height_steps.side_m / 2);
   for (std::size_t k = 0; k < heights_m.size(); ++k) {
     heights_[k] = static_cast<float>(static_cast<double>(heights_m[k]) - range_.middle_m);
   }
-  // What float arithmetic may lose on the way comes off the tolerance, so that the bound is true.
-  const double rounding =
-      6 * range_.reach_m * static_cast<double>(std::numeric_limits<float>::epsilon());
+  // What float arithmetic may lose on the way comes off the tolerance, so that the bound is true: here,
+  // and where the header's maximum, which may be a little above the highest vertex, becomes a float.
+  const double farthest_m = grid.on_globe() ? std::abs(range_.middle_m) + 1.2 * range_.reach_m : 0;
+  const double rounding = (6 * range_.reach_m + farthest_m / 2) *
+                          static_cast<double>(std::numeric_limits<float>::epsilon());
   threshold_ = static_cast<float>(std::max(tolerance_m - rounding, tolerance_m / 2));
 
   curved_ = curvature == Curvature::kCounts && largest_sagitta_m(grid) > tolerance_m / 64;

@@ -15,6 +15,7 @@
 
 #include "stages/curvature.h"
 #include "stages/delaunay.h"
+#include "stages/height_step.h"
 #include "stages/triangle_scan.h"
 #include "stages/worst_post.h"
 
@@ -30,10 +31,10 @@ class PostErrors {
   };
   using Corners = std::array<Corner, 3>;
 
-  // REQUIRES: heights_m has grid.post_count() finite heights; tolerance_m > height_step_m / 2;
+  // REQUIRES: heights_m has grid.post_count() finite heights; tolerance_m > height_steps.side_m / 2;
   // `grid` outlives this.
   PostErrors(const PostGrid& grid, std::span<const float> heights_m, double tolerance_m,
-             double height_step_m, Curvature curvature);
+             const HeightSteps& height_steps, Curvature curvature);
 
   // The middle of the heights, on a step. Heights are kept relative to it: differences of floats
   // near each other lose nothing, so the error of a float sum stays far below a tolerance even in

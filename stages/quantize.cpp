@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 
 #include "scheduler/check.h"
@@ -10,19 +11,60 @@
 namespace qmpipe {
 namespace {
 
-void quantize_heights(std::span<const std::int64_t> steps, double height_step_m,
+// Two tiles may round to either side of a vertex that they share: less than a millimetre together.
+constexpr double kLargestRoundingM = 0.00049;
+constexpr std::int64_t kMostShift = 64;
+
+// What the header says of heights, and how many units an inner step has.
+struct HeightScale {
+  double min_m = 0;
+  double max_m = 0;
+  std::int64_t units = 0;
+};
+
+double rounding_m(double height_m) {
+  return std::abs(static_cast<double>(static_cast<float>(height_m)) - height_m);
+}
+
+// `lowest_side`: the lowest vertex, down to a step of the sides; `range`: from there, in inner steps.
+HeightScale height_scale(std::int64_t lowest_side, std::int64_t range, const HeightSteps& steps) {
+  HeightScale best;
+  double least_rounding_m = std::numeric_limits<double>::infinity();
+  for (std::int64_t units = kQuantizedMax / range; units > 0; --units) {
+    // Lower minima shift the maximum to other places between two floats.
+    for (std::int64_t down = 0; down < kMostShift; ++down) {
+      if ((range + down * steps.parts) * units > kQuantizedMax) break;
+      const double min_m = static_cast<double>(lowest_side - down) * steps.side_m;
+      const double max_m = min_m + kQuantizedMax * steps.inner_m / static_cast<double>(units);
+      const double rounded_m = rounding_m(max_m);
+      if (rounded_m < least_rounding_m) {
+        least_rounding_m = rounded_m;
+        best = {.min_m = min_m, .max_m = max_m, .units = units};
+      }
+      if (least_rounding_m <= kLargestRoundingM) return best;
+    }
+  }
+  return best;
+}
+
+void quantize_heights(std::span<const std::int64_t> inner, const HeightSteps& steps,
                       QuantizedMesh& mesh) {
-  const auto [low, high] = std::minmax_element(steps.begin(), steps.end());
-  const std::int64_t range = *high - *low;
+  const auto [low, high] = std::minmax_element(inner.begin(), inner.end());
+  const std::int64_t lowest_side = static_cast<std::int64_t>(
+      std::floor(static_cast<double>(*low) / static_cast<double>(steps.parts)));
+  const std::int64_t range = *high - lowest_side * steps.parts;
   QMPIPE_CHECK(range <= kQuantizedMax);
-  const std::int64_t m = range == 0 ? 0 : kQuantizedMax / range;
-  const double min_m = static_cast<double>(*low) * height_step_m;
-  mesh.header.min_height_m = static_cast<float>(min_m);
+  HeightScale scale{.min_m = static_cast<double>(lowest_side) * steps.side_m};
   // A flat tile says min = max, from which any stored height decodes to the same.
-  mesh.header.max_height_m = static_cast<float>(
-      m == 0 ? min_m : min_m + kQuantizedMax * height_step_m / static_cast<double>(m));
-  mesh.h.reserve(steps.size());
-  for (const std::int64_t k : steps) mesh.h.push_back(static_cast<std::uint16_t>((k - *low) * m));
+  scale.max_m = scale.min_m;
+  if (range > 0) scale = height_scale(lowest_side, range, steps);
+  mesh.header.min_height_m = static_cast<float>(scale.min_m);
+  mesh.header.max_height_m = static_cast<float>(scale.max_m);
+  const auto base = static_cast<std::int64_t>(std::llround(scale.min_m / steps.inner_m));
+  mesh.h.reserve(inner.size());
+  for (const std::int64_t k : inner) {
+    mesh.h.push_back(static_cast<std::uint16_t>((k - base) * scale.units));
+  }
 }
 
 void list_sides(QuantizedMesh& mesh) {
@@ -84,7 +126,7 @@ Vec3 decoded_position_ecef(const QuantizedMesh& mesh, const RectangleDeg& rectan
                   .height_m = decoded_height_m(mesh, vertex)});
 }
 
-QuantizedMesh quantize(const PostGrid& grid, const Tin& tin, double height_step_m) {
+QuantizedMesh quantize(const PostGrid& grid, const Tin& tin, const HeightSteps& height_steps) {
   QMPIPE_CHECK(grid.on_globe() && tin.vertices.size() >= 4);
   QuantizedMesh mesh;
   std::vector<std::int64_t> steps;
@@ -92,11 +134,11 @@ QuantizedMesh quantize(const PostGrid& grid, const Tin& tin, double height_step_
   mesh.u.reserve(tin.vertices.size());
   mesh.v.reserve(tin.vertices.size());
   for (const TinVertex& vertex : tin.vertices) {
-    steps.push_back(std::llround(vertex.height_m / height_step_m));
+    steps.push_back(std::llround(vertex.height_m / height_steps.inner_m));
     mesh.u.push_back(static_cast<std::uint16_t>(vertex.u));
     mesh.v.push_back(static_cast<std::uint16_t>(vertex.v));
   }
-  quantize_heights(steps, height_step_m, mesh);
+  quantize_heights(steps, height_steps, mesh);
   mesh.indices = tin.indices;
   list_sides(mesh);
   fill_globe_fields(grid, mesh);

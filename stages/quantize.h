@@ -1,9 +1,10 @@
 // From a TIN to a quantized mesh whose shared vertices decode alike in every tile of the zoom.
 //
 // A vertex at height k * step is stored as (k - k_min) * m, where m is the largest integer with
-// 32767 * step / m >= the tile's height range, and the header says min = k_min * step,
-// max = min + 32767 * step / m (DESIGN 5.4). The header's float32 maximum adds at most half a unit
-// in its last place: under 0.5 mm below 8 km.
+// 32767 * step / m >= the tile's height range, and the header says min = k_min * step, which is the
+// largest multiple of the sides' step that is not above the lowest vertex, and
+// max = min + 32767 * step / m (DESIGN 5.4). The header's minimum is exact; rounding its maximum to
+// float32 moves no vertex by more than 0.5 mm: above 16 km m and k_min are chosen so.
 #pragma once
 
 #include "formats/quantized_mesh.h"
@@ -12,9 +13,9 @@
 namespace qmpipe {
 
 // Header, vertices, triangles and side lists; normals are left empty. Vertices keep the TIN's order.
-// REQUIRES: the TIN of a tile, strip_ordered(); its heights are multiples of the step, and their
-// range fits 32767 of them.
-QuantizedMesh quantize(const PostGrid& grid, const Tin& tin, double height_step_m);
+// REQUIRES: the TIN of a tile, strip_ordered(); its heights are multiples of the inner step, those of
+// vertices on sides also of the sides', and their range fits 32767 inner steps.
+QuantizedMesh quantize(const PostGrid& grid, const Tin& tin, const HeightSteps& height_steps);
 
 // The height of a vertex as a client decodes it.
 double decoded_height_m(const QuantizedMesh& mesh, std::size_t vertex);

@@ -68,17 +68,17 @@ std::vector<double> heights_at_posts(const PostGrid& grid, const Surface& surfac
                     }
                   });
   }
+  for (std::size_t k = 0; k < surface.posts.size(); ++k) {
+    if (surface.posts[k] == kNoPost) continue;
+    heights[static_cast<std::size_t>(surface.posts[k])] = surface.heights_m[k];
+  }
   return heights;
 }
 
 ErrorSummary measure(const PostGrid& grid, const Surface& surface, std::span<const float> heights_m,
                      std::span<const std::uint8_t> valid) {
   QMPIPE_CHECK(heights_m.size() == grid.post_count() && valid.size() == grid.post_count());
-  std::vector<double> heights = heights_at_posts(grid, surface);
-  for (std::size_t k = 0; k < surface.posts.size(); ++k) {
-    if (surface.posts[k] == kNoPost) continue;
-    heights[static_cast<std::size_t>(surface.posts[k])] = surface.heights_m[k];
-  }
+  const std::vector<double> heights = heights_at_posts(grid, surface);
   ErrorSummary summary;
   for (std::size_t k = 0; k < heights.size(); ++k) {
     if (valid[k] == 0 || std::isnan(heights[k])) continue;
@@ -110,6 +110,10 @@ void ErrorSummary::add(const ErrorSummary& other) {
 double ErrorSummary::mean_m() const { return posts == 0 ? 0 : sum_m / static_cast<double>(posts); }
 double ErrorSummary::rms_m() const {
   return posts == 0 ? 0 : std::sqrt(sum_of_squares_m2 / static_cast<double>(posts));
+}
+
+std::vector<double> surface_at_posts(const PostGrid& grid, const QuantizedMesh& mesh) {
+  return heights_at_posts(grid, surface_of(grid, mesh));
 }
 
 ErrorSummary measure_error(const PostGrid& grid, const QuantizedMesh& mesh,

@@ -24,6 +24,9 @@ struct ErrorSummary {
   double rms_m() const;
 };
 
+// The decoded surface at each post of the tile; NaN where no triangle is. REQUIRES: a mesh that decoded.
+std::vector<double> surface_at_posts(const PostGrid& grid, const QuantizedMesh& mesh);
+
 // REQUIRES: a mesh that decoded; heights_m and valid of kTilePostCount. Posts that no triangle
 // covers (a damaged tile of another program) are not counted.
 ErrorSummary measure_error(const PostGrid& grid, const QuantizedMesh& mesh,

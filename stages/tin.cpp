@@ -2,16 +2,19 @@
 
 #include <algorithm>
 
-#include "stages/height_step.h"
-
 namespace qmpipe {
 
 TinVertex vertex_at_post(const PostGrid& grid, std::int32_t post, float height_m,
-                         double height_step_m) {
-  return {.u = grid.u[static_cast<std::size_t>(grid.column(post))],
-          .v = grid.v[static_cast<std::size_t>(grid.row(post))],
+                         const HeightSteps& height_steps) {
+  const std::int32_t i = grid.column(post);
+  const std::int32_t j = grid.row(post);
+  const bool is_on_side =
+      i == 0 || j == 0 || i == grid.width_posts - 1 || j == grid.height_posts - 1;
+  return {.u = grid.u[static_cast<std::size_t>(i)],
+          .v = grid.v[static_cast<std::size_t>(j)],
           .post = post,
-          .height_m = snapped_height(static_cast<double>(height_m), height_step_m)};
+          .height_m = snapped_height(static_cast<double>(height_m),
+                                     is_on_side ? height_steps.side_m : height_steps.inner_m)};
 }
 
 std::int32_t post_at(const PostGrid& grid, std::int32_t u, std::int32_t v) {

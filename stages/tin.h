@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "scheduler/border.h"
+#include "stages/height_step.h"
 #include "stages/post_grid.h"
 
 namespace qmpipe {
@@ -20,7 +21,8 @@ struct TinVertex {
   // The post that this vertex is, or kNoPost for one that a method has put between posts. Vertices
   // on the sides are always posts.
   std::int32_t post = kNoPost;
-  // A multiple of the height step (DESIGN 5.4), so that neighbours decode common vertices alike.
+  // A multiple of the tile's height step (DESIGN 5.4); on a side of the zoom's, so that neighbours
+  // decode common vertices alike.
   double height_m = 0;
   friend bool operator==(const TinVertex&, const TinVertex&) = default;
 };
@@ -36,9 +38,9 @@ struct Tin {
 // By index_of(Side): the vertices that a side must have, or none where this tile decides.
 using FixedBorders = std::array<std::optional<BorderMask>, 4>;
 
-// The vertex that a post is: its height on a step.
+// The vertex that a post is: its height on a step, the sides' or the inner one.
 TinVertex vertex_at_post(const PostGrid& grid, std::int32_t post, float height_m,
-                         double height_step_m);
+                         const HeightSteps& height_steps);
 
 // The post whose rounded place this is, or kNoPost.
 std::int32_t post_at(const PostGrid& grid, std::int32_t u, std::int32_t v);

@@ -26,8 +26,9 @@ const TilingScheme kMercator(Projection::kMercator);
 EdgeCollapseOptions options_for(const std::vector<float>& heights_m, double tolerance_m,
                                 Curvature curvature) {
   const auto [low, high] = std::minmax_element(heights_m.begin(), heights_m.end());
-  const auto step_m = height_step_for(tolerance_m, static_cast<double>(*high - *low) + tolerance_m);
-  return {.height_step_m = step_m.value(), .tolerance_m = tolerance_m, .curvature = curvature};
+  const auto step_m = height_step_for(tolerance_m, static_cast<double>(*high - *low) + tolerance_m,
+                                      std::max(std::abs(*low), std::abs(*high)) + tolerance_m);
+  return {.height_steps = step_m.value(), .tolerance_m = tolerance_m, .curvature = curvature};
 }
 
 void expect_right(const PostGrid& grid, const std::vector<float>& heights_m,
@@ -41,12 +42,12 @@ void expect_right(const PostGrid& grid, const std::vector<float>& heights_m,
   }
   const auto [low, high] = std::minmax_element(heights_m.begin(), heights_m.end());
   for (const TinVertex& vertex : tin.vertices) {
-    ASSERT_EQ(std::remainder(vertex.height_m, options.height_step_m), 0);
-    ASSERT_GE(vertex.height_m, static_cast<double>(*low) - options.height_step_m / 2);
-    ASSERT_LE(vertex.height_m, static_cast<double>(*high) + options.height_step_m / 2);
+    ASSERT_EQ(std::remainder(vertex.height_m, options.height_steps.inner_m), 0);
+    ASSERT_GE(vertex.height_m, static_cast<double>(*low) - options.height_steps.inner_m / 2);
+    ASSERT_LE(vertex.height_m, static_cast<double>(*high) + options.height_steps.inner_m / 2);
     if (vertex.post == kNoPost) continue;
     const auto height_m = static_cast<double>(heights_m[static_cast<std::size_t>(vertex.post)]);
-    ASSERT_LE(std::abs(vertex.height_m - height_m), options.height_step_m / 2);
+    ASSERT_LE(std::abs(vertex.height_m - height_m), options.height_steps.inner_m / 2);
   }
   if (!options.tolerance_m) return;
   ASSERT_LE(largest_error_m(grid, tin, heights_m, fixed), *options.tolerance_m);
@@ -58,7 +59,7 @@ void expect_right(const PostGrid& grid, const std::vector<float>& heights_m,
       judged[static_cast<std::size_t>(tile_post_index(p.i, p.j))] = 0;
     }
   }
-  const QuantizedMesh mesh = quantize(grid, tin, options.height_step_m);
+  const QuantizedMesh mesh = quantize(grid, tin, options.height_steps);
   ASSERT_LE(measure_error(grid, mesh, heights_m, judged).largest_m, *options.tolerance_m);
 }
 
@@ -99,7 +100,7 @@ TEST_P(EdgeCollapseOnTerrain, StopsAtTheFirstNumberOfEdgesBelowTheOneAsked) {
   const auto heights_m = random_terrain(GetParam(), random);
   const PostGrid grid = make_tile_grid(kGeodetic, {9, 300, 411});
   for (const std::int64_t least_edges : {100'000, 1'000}) {
-    const EdgeCollapseOptions options = {.height_step_m = 0.25, .least_edges = least_edges};
+    const EdgeCollapseOptions options = {.height_steps = 0.25, .least_edges = least_edges};
     const Tin tin = edge_collapse(grid, heights_m, {}, options);
     ASSERT_EQ(fault_of(grid, tin), "");
     // Euler: a collapse takes two edges or three.
@@ -128,7 +129,7 @@ TEST(EdgeCollapse, AFlatGridOfAnySizeIsTwoTriangles) {
     const std::vector<float> heights_m(grid.post_count(), 3.0F);
     for (const auto& tolerance_m : {std::optional<double>(), std::optional(0.5)}) {
       const Tin tin =
-          edge_collapse(grid, heights_m, {}, {.height_step_m = 0.5, .tolerance_m = tolerance_m});
+          edge_collapse(grid, heights_m, {}, {.height_steps = 0.5, .tolerance_m = tolerance_m});
       EXPECT_EQ(fault_of(grid, tin), "");
       EXPECT_EQ(tin.triangle_count(), 2U);
     }
@@ -155,7 +156,7 @@ TEST(EdgeCollapse, NeedsFewerTrianglesThanGreedyInsertionAtTheSameTolerance) {
     const Tin tin = edge_collapse(grid, heights_m, {}, options);
     const Tin greedy = greedy_insertion(
         grid, heights_m, {},
-        {.tolerance_m = *options.tolerance_m, .height_step_m = options.height_step_m});
+        {.tolerance_m = *options.tolerance_m, .height_steps = options.height_steps});
     EXPECT_LT(tin.triangle_count(), greedy.triangle_count());
   }
 }

@@ -19,7 +19,7 @@ const TilingScheme kMercator(Projection::kMercator);
 
 GreedyOptions options_for(double tolerance_m, Curvature curvature) {
   return {.tolerance_m = tolerance_m,
-          .height_step_m = std::exp2(std::floor(std::log2(tolerance_m / 16))),
+          .height_steps = std::exp2(std::floor(std::log2(tolerance_m / 16))),
           .curvature = curvature};
 }
 

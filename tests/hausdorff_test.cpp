@@ -26,7 +26,7 @@ QuantizedMesh mesh_of(const std::vector<float>& heights_m, double tolerance_m) {
   const PostGrid grid = make_tile_grid(kScheme, kKey);
   const Tin tin = strip_ordered(greedy_insertion(
       grid, heights_m, {},
-      {.tolerance_m = tolerance_m, .height_step_m = tolerance_m / 64, .initial_grid_cells = 16}));
+      {.tolerance_m = tolerance_m, .height_steps = tolerance_m / 64, .initial_grid_cells = 16}));
   return quantize(grid, tin, tolerance_m / 64);
 }
 

@@ -218,7 +218,7 @@ TEST(Heightfield, PullFadesToTheBaseWithin128Posts) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
     const Island island = make_island(random, [](std::int64_t, std::int64_t) { return 1000.0F; });
-    const Heightfield field = island.world.heightfield({.base_height_m = -200});
+    const Heightfield field = island.world.heightfield({.base_height_m = -200, .base_zoom = 2});
     const PostWindow& data = island.data;
     const WindowHeights heights = field.window(
         8, {data.i0 - 180, data.j0 - 180, data.width_posts + 360, data.height_posts + 360});
@@ -241,6 +241,45 @@ TEST(Heightfield, PullFadesToTheBaseWithin128Posts) {
   }
 }
 
+// One surface: what is a void of both zooms has the coarser one's height.
+TEST(Heightfield, VoidsBelowTheBaseZoomLieOnTheCoarserZoomsSurface) {
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937_64 random(seed);
+    Island island = make_island(random, [&random](std::int64_t, std::int64_t) {
+      return static_cast<float>(below(random, 4000));
+    });
+    island.world.poles.back()[1] = 55.0F;
+    const std::int32_t base_zoom = below(random, 8);
+    const Heightfield field =
+        island.world.heightfield({.base_height_m = 10, .base_zoom = base_zoom});
+    const std::int64_t north = Lattice(kGeodetic, 8).rows() - 1;
+    std::int64_t compared = 0;
+    std::int64_t i0 = island.data.i0 - 300;
+    std::int64_t j0 = island.data.j0 - 300;
+    for (std::int32_t zoom = 8; zoom > 0; --zoom, i0 >>= 1, j0 >>= 1) {
+      const WindowHeights fine = field.window(zoom, {i0, j0, 700, 700});
+      const WindowHeights coarse = field.window(zoom - 1, {i0 >> 1, j0 >> 1, 352, 352});
+      for (std::int64_t j = j0 + (j0 & 1); j < j0 + 700; j += 2) {
+        for (std::int64_t i = i0 + (i0 & 1); i < i0 + 700; i += 2) {
+          if (fine.valid[fine.index(i, j)] != 0) continue;
+          if (zoom <= base_zoom) {
+            ASSERT_EQ(fine.height_m(i, j), 10.0F);
+          } else {
+            ASSERT_TRUE(same_bits(fine.height_m(i, j), coarse.height_m(i / 2, j / 2)))
+                << zoom << " " << i << " " << j;
+          }
+          ++compared;
+        }
+      }
+    }
+    EXPECT_GT(compared, 100000);
+    // The pole too.
+    const float pole_m = field.window(8, {0, north, 1, 1}).heights_m[0];
+    EXPECT_EQ(pole_m, 55.0F);
+  }
+}
+
 // Level k of the pull is off by at most the slope over its 2^k posts and has half the weight of the
 // level before it, so six levels add up to about six slopes; a sixty-fourth of the whole drop is
 // left for the base, four times that at a corner.
@@ -256,7 +295,7 @@ TEST(Heightfield, PullHasNoJumpAtTheEdgeOfTheData) {
                                 slope_j * static_cast<double>(j % 256 - 100));
     });
     const PostWindow& data = island.data;
-    const Heightfield field = island.world.heightfield({.base_height_m = 0});
+    const Heightfield field = island.world.heightfield({.base_height_m = 0, .base_zoom = 2});
     const WindowHeights heights =
         field.window(8, {data.i0 - 2, data.j0 - 2, data.width_posts + 4, data.height_posts + 4});
     for (std::int64_t j = data.j0; j < data.j0 + data.height_posts; ++j) {

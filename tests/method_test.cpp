@@ -110,14 +110,14 @@ TEST(MethodParameters, ValuesReachTheStages) {
   MethodParameters parameters;
   parameters.set("e_e", ZoomSeries({77}));
   parameters.set("h_c", ZoomSeries({9}));
-  const MethodFrame frame = {.height_step_m = 0.5, .curvature = Curvature::kIgnored, .seed = 5};
+  const MethodFrame frame = {.height_steps = 0.5, .curvature = Curvature::kIgnored, .seed = 5};
   const auto options = [&](Method method, Stop stop) {
     return method_options(method, stop, values_at(parameters, method, stop, 0), frame);
   };
   const auto edges = std::get<EdgeCollapseOptions>(options(Method::kEdgeCollapse, Stop::kEdges));
   EXPECT_EQ(edges.least_edges, 77);
   EXPECT_FALSE(edges.tolerance_m);
-  EXPECT_EQ(edges.height_step_m, 0.5);
+  EXPECT_EQ(edges.height_steps.inner_m, 0.5);
   const auto bound =
       std::get<EdgeCollapseOptions>(options(Method::kEdgeCollapse, Stop::kTolerance));
   EXPECT_EQ(bound.least_edges, 0);
@@ -140,7 +140,7 @@ TEST(Simplify, EveryMethodMakesASoundTileWithInheritedBorders) {
     const FixedBorders fixed = testing::random_borders(random, 5);
     const MethodOptions options = method_options(
         method, Stop::kTolerance, values_at(MethodParameters(), method, Stop::kTolerance, 6),
-        {.height_step_m = 1, .curvature = Curvature::kCounts, .seed = 3});
+        {.height_steps = 1, .curvature = Curvature::kCounts, .seed = 3});
     const Tin tin = simplify(tile, heights_m, fixed, options);
     EXPECT_EQ(testing::fault_of(tile, tin), "");
     EXPECT_LT(tin.vertices.size(), kTilePostCount / 2);

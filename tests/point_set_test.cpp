@@ -25,7 +25,7 @@ double spacing_m(const TileKey& key) { return 78271.5 / (1 << key.zoom); }
 // The paper's values of zoom 10, made to fit the zoom where they are lengths.
 PointSetOptions options_for(const TileKey& key, PointSetMethod method) {
   return {.method = method,
-          .height_step_m = 0.25,
+          .height_steps = 0.25,
           .seed = 7,
           .polyline_error_m = spacing_m(key) / 76,
           .least_polyline_points = 8,
@@ -39,14 +39,14 @@ void expect_right(const PostGrid& grid, const std::vector<float>& heights_m,
   ASSERT_EQ(fault_of(grid, tin), "");
   const auto [low, high] = std::minmax_element(heights_m.begin(), heights_m.end());
   for (const TinVertex& vertex : tin.vertices) {
-    ASSERT_EQ(vertex.height_m, snapped_height(vertex.height_m, options.height_step_m));
-    ASSERT_GE(vertex.height_m, static_cast<double>(*low) - options.height_step_m / 2);
-    ASSERT_LE(vertex.height_m, static_cast<double>(*high) + options.height_step_m / 2);
+    ASSERT_EQ(vertex.height_m, snapped_height(vertex.height_m, options.height_steps.inner_m));
+    ASSERT_GE(vertex.height_m, static_cast<double>(*low) - options.height_steps.inner_m / 2);
+    ASSERT_LE(vertex.height_m, static_cast<double>(*high) + options.height_steps.inner_m / 2);
     if (vertex.post == kNoPost) {
       ASSERT_EQ(options.method, PointSetMethod::kWlop);
     } else {
       const float height_m = heights_m[static_cast<std::size_t>(vertex.post)];
-      ASSERT_EQ(vertex, vertex_at_post(grid, vertex.post, height_m, options.height_step_m));
+      ASSERT_EQ(vertex, vertex_at_post(grid, vertex.post, height_m, options.height_steps));
     }
   }
   for (const Side side : kSides) {
@@ -189,7 +189,7 @@ TEST(PointSet, ACrestSurvivesThatChanceWouldTakeAway) {
       heights_m.push_back(static_cast<float>(800 - 16 * std::abs(i - crest(j))));
     }
   }
-  PointSetOptions options{.height_step_m = 0.25, .seed = 1, .removed_percent = 97};
+  PointSetOptions options{.height_steps = 0.25, .seed = 1, .removed_percent = 97};
   const auto lowest_on_crest_m = [&] {
     const Tin tin = simplify_point_set(grid, heights_m, {}, options);
     EXPECT_EQ(fault_of(grid, tin), "");
@@ -212,7 +212,7 @@ TEST(PointSet, WorksForPlanesOfAnySize) {
       heights_m.push_back(static_cast<float>(k * k % 97));
     }
     for (const PointSetMethod method : kMethods) {
-      PointSetOptions options{.method = method, .height_step_m = 0.5};
+      PointSetOptions options{.method = method, .height_steps = 0.5};
       options.cell_size_m = 35;
       options.neighbour_radius_m = 45;
       const Tin tin = simplify_point_set(grid, heights_m, {}, options);

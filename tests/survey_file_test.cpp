@@ -37,7 +37,8 @@ SurveyedZoom random_survey(std::mt19937& random, std::size_t most) {
     surveyed.tiles.push_back({.key = key,
                               .lowest_m = std::min(a, b),
                               .highest_m = std::max(a, b),
-                              .valid_posts = static_cast<std::int32_t>(random() % 66049 + 1)});
+                              .valid_posts = static_cast<std::int32_t>(random() % 66049 + 1),
+                              .rim_m = random() % 2 == 0 ? 0 : std::abs(a)});
   }
   if (random() % 2 == 0) surveyed.pole_heights_m[0] = height_m(random);
   if (random() % 2 == 0) surveyed.pole_heights_m[1] = height_m(random);

@@ -67,7 +67,7 @@ TEST(TileSvg, EveryTriangleIsDrawnOnce) {
   std::mt19937_64 random(4);
   const auto heights_m = testing::random_terrain(testing::Terrain::kHills, random);
   const PostGrid grid = make_tile_grid(TilingScheme(Projection::kGeodetic), {9, 300, 411});
-  const Tin tin = greedy_insertion(grid, heights_m, {}, {.tolerance_m = 30, .height_step_m = 1});
+  const Tin tin = greedy_insertion(grid, heights_m, {}, {.tolerance_m = 30, .height_steps = 1});
   EXPECT_EQ(count_of(tin_svg(grid, tin), "z"), tin.triangle_count());
   EXPECT_EQ(count_of(posts_svg(grid, heights_m), "z"), 128U * 128U);
 }

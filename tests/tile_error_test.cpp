@@ -30,7 +30,7 @@ Case random_case(std::uint64_t seed) {
   c.heights_m = random_terrain(kTerrains[seed % kTerrains.size()], random);
   c.tin = strip_ordered(
       greedy_insertion(c.grid, c.heights_m, {},
-                       {.tolerance_m = 40, .height_step_m = 1, .curvature = Curvature::kIgnored}));
+                       {.tolerance_m = 40, .height_steps = 1, .curvature = Curvature::kIgnored}));
   c.mesh = quantize(c.grid, c.tin, 1);
   // Judged against other heights than it was made from, so that errors are large too.
   for (float& h : c.heights_m) h += static_cast<float>(random() % 100) / 10;

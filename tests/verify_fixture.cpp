@@ -35,7 +35,7 @@ std::vector<std::uint8_t> make_tile(const SetPlan& plan, const TileKey& key) {
   const Tin tin =
       strip_ordered(greedy_insertion(grid, own.heights_m, regular_borders(),
                                      {.tolerance_m = std::ldexp(plan.root_tolerance_m, -key.zoom),
-                                      .height_step_m = plan.height_step_m,
+                                      .height_steps = plan.height_step_m,
                                       .initial_grid_cells = 8,
                                       .curvature = Curvature::kIgnored}));
   QuantizedMesh mesh = quantize(grid, tin, plan.height_step_m);

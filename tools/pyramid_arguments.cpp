@@ -32,8 +32,10 @@ void add_input_options(CLI::App& command, PyramidArguments& arguments) {
   command
       .add_option(
           "--nodata", arguments.voids,
-          "What fills voids: pull (from the coarser zooms, fading to 0 m some 64 posts from "
-          "the data) or height=H in metres")
+          "The ground where there are no data: pull (one surface for all zooms, fading to 0 m over "
+          "about four times the height of the data's rim), pull=D (over D metres), height=H (H "
+          "metres at once) or omit (as pull, without tiles that have a void, where the format "
+          "allows)")
       ->capture_default_str();
 }
 
