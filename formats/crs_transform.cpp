@@ -8,18 +8,11 @@
 #include <type_traits>
 #include <utility>
 
+#include "formats/free_with.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
 namespace {
-
-template <auto Free>
-struct FreeWith {
-  template <class T>
-  void operator()(T* pointer) const {
-    Free(pointer);
-  }
-};
 
 using Context = std::unique_ptr<PJ_CONTEXT, FreeWith<proj_context_destroy>>;
 using Object = std::unique_ptr<PJ, FreeWith<proj_destroy>>;

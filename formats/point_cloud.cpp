@@ -114,7 +114,11 @@ PointCloud cloud_in(const RasterCrs& crs) {
   cloud.crs_wkt = crs.text.wkt;
   cloud.crs_name = crs.name;
   cloud.assumptions = crs.assumptions;
-  if (crs.vertical_unit.empty() && !crs.is_geographic && crs.metres_per_unit != 1) {
+  if (crs.vertical.points_down) {
+    cloud.assumptions.push_back("the axis of '" + crs.vertical.name +
+                                "' points down, but heights of points are taken upwards");
+  }
+  if (crs.vertical.unit.empty() && !crs.is_geographic && crs.metres_per_unit != 1) {
     cloud.assumptions.push_back(
         fmt::format("the CRS says nothing about heights; they are taken in its unit of x and y,"
                     " {:g} m",

@@ -178,7 +178,7 @@ RasterCrs crs_of_points(const std::string& path, const LasCrs& crs,
 }
 
 double metres_per_height_unit(const RasterCrs& crs) {
-  if (!crs.vertical_unit.empty()) return crs.vertical_metres_per_unit;
+  if (!crs.vertical.unit.empty()) return crs.vertical.metres_per_unit;
   return crs.is_geographic ? 1 : crs.metres_per_unit;
 }
 

@@ -152,15 +152,7 @@ RasterCrs crs_of(GDALDataset& dataset, const std::string& path, const std::strin
       find_crs(dataset, path, opened, override_text, need, result.assumptions);
   if (crs.IsEmpty()) return result;
   result.name = crs.GetName() != nullptr ? crs.GetName() : "unnamed";
-  result.has_vertical_datum = crs.IsVertical() != 0 || crs.GetAxesCount() == 3;
-  if (crs.IsCompound() != 0) {
-    const char* unit = nullptr;
-    const double metres = crs.GetTargetLinearUnits("COMPD_CS|VERT_CS", &unit);
-    if (metres > 0 && std::isfinite(metres)) {
-      result.vertical_metres_per_unit = metres;
-      result.vertical_unit = unit != nullptr ? unit : "";
-    }
-  }
+  result.vertical = vertical_crs_of(wkt_of(crs));
   result.text.axes = axes_of(crs);
   crs.StripVertical();
   if (crs.GetAxesCount() == 3) crs.DemoteTo2D(nullptr);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "formats/crs_transform.h"
+#include "formats/vertical_crs.h"
 
 class GDALDataset;
 
@@ -17,10 +18,7 @@ struct RasterCrs {
   bool is_geographic = false;
   double turn = 360;           // once round the globe in the unit of a geographic CRS
   double metres_per_unit = 1;  // of a plane CRS's x and y
-  bool has_vertical_datum = false;
-  // Of a compound CRS's heights; empty when the CRS says nothing about heights.
-  std::string vertical_unit;
-  double vertical_metres_per_unit = 1;
+  VerticalCrs vertical;
   // What had to be assumed, as sentences without a full stop.
   std::vector<std::string> assumptions;
 };

@@ -4,8 +4,10 @@
 #include <gdal_priv.h>
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "formats/errors.h"
 #include "formats/gdal_session.h"
@@ -17,6 +19,7 @@ namespace {
 // Blocks of fewer pixels are cached several at a time: a look-up costs more than their values.
 constexpr std::int64_t kFewPixels = 16'384;
 constexpr std::int64_t kJoinedSide = 256;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 // A VRT's blocks are no blocks of a file: what lies below is decoded by GDAL, handle by handle, and
 // large windows share less of it.
 constexpr std::int64_t kVirtualSide = 1024;
@@ -85,12 +88,14 @@ void describe_blocks(GDALRasterBand& band, bool has_mask, RasterInfo& info) {
 }
 
 RasterReader::RasterReader(GDALRasterBand& band, bool has_mask, const RasterInfo& info,
-                           std::shared_ptr<SourceBlockCache> cache, std::uint32_t source_number)
+                           std::shared_ptr<SourceBlockCache> cache, std::uint32_t source_number,
+                           BlockWatcher* watcher)
     : band_(band),
       mask_(has_mask ? band.GetMaskBand() : nullptr),
       info_(info),
       cache_(std::move(cache)),
-      source_number_(source_number) {
+      source_number_(source_number),
+      watcher_(watcher) {
   QMPIPE_CHECK(info.cached_block_bytes > 0);
   kind_.type = band.GetRasterDataType();
   kind_.value_bytes = GDALGetDataTypeSizeBytes(band.GetRasterDataType());
@@ -115,8 +120,8 @@ void RasterReader::raster_io(GDALRasterBand& band, const PixelWindow& window, in
   if (result != CE_None) refuse(info_, window, session);
 }
 
-void RasterReader::read_by_window(const PixelWindow& window, std::span<double> values,
-                                  std::span<std::uint8_t> mask) const {
+void RasterReader::read_past_cache(const PixelWindow& window, std::span<double> values,
+                                   std::span<std::uint8_t> mask) const {
   raster_io(band_, window, GDT_Float64, values.data(), 0);
   if (!mask.empty()) raster_io(*mask_, window, GDT_Byte, mask.data(), 0);
 }
@@ -174,6 +179,34 @@ void RasterReader::decode(std::int64_t column, std::int64_t row,
   }
 }
 
+void RasterReader::copy_values(const std::uint8_t* from, double* to, std::int64_t count) const {
+  GDALCopyWords64(from, static_cast<GDALDataType>(kind_.type), static_cast<int>(kind_.value_bytes),
+                  to, GDT_Float64, static_cast<int>(sizeof(double)), count);
+}
+
+// A block may be a whole raster: a piece at a time.
+void RasterReader::show(std::int64_t block, const PixelWindow& covered,
+                        std::span<const std::uint8_t> bytes) const {
+  const std::uint8_t* const mask =
+      mask_ == nullptr
+          ? nullptr
+          : bytes.data() + info_.cached_width * info_.cached_height * kind_.value_bytes;
+  std::vector<double> values;
+  for (std::int64_t r = 0; r < covered.height; ++r) {
+    for (std::int64_t c = 0; c < covered.width; c += kFewPixels) {
+      const std::int64_t first = r * info_.cached_width + c;
+      values.resize(static_cast<std::size_t>(std::min(kFewPixels, covered.width - c)));
+      const auto count = static_cast<std::int64_t>(values.size());
+      copy_values(bytes.data() + first * kind_.value_bytes, values.data(), count);
+      for (std::int64_t k = 0; mask != nullptr && k < count; ++k) {
+        if (mask[first + k] == 0) values[static_cast<std::size_t>(k)] = kNaN;
+      }
+      watcher_->see(values);
+    }
+  }
+  watcher_->done(block, *this);
+}
+
 void RasterReader::read_block(std::int64_t column, std::int64_t row, const PixelWindow& window,
                               std::span<double> values, std::span<std::uint8_t> mask) const {
   const PixelWindow covered = covered_by(column, row);
@@ -183,8 +216,10 @@ void RasterReader::read_block(std::int64_t column, std::int64_t row, const Pixel
       .size_bytes = info_.cached_block_bytes,
       .file_blocks = blocks_for(covered.width, info_.block_width) *
                      blocks_for(covered.height, info_.block_height)};
-  const auto bytes =
-      cache_->get(request, [&](std::span<std::uint8_t> into) { decode(column, row, into); });
+  const auto bytes = cache_->get(request, [&](std::span<std::uint8_t> into) {
+    decode(column, row, into);
+    if (watcher_ != nullptr && watcher_->wants(request.index)) show(request.index, covered, into);
+  });
   const std::int64_t first = std::max(window.column0, covered.column0);
   const std::int64_t width =
       std::min(window.column0 + window.width, covered.column0 + covered.width) - first;
@@ -193,9 +228,7 @@ void RasterReader::read_block(std::int64_t column, std::int64_t row, const Pixel
   for (std::int64_t r = std::max(window.row0, covered.row0); r < end; ++r) {
     const std::int64_t from = (r - covered.row0) * info_.cached_width + first - covered.column0;
     const std::int64_t to = (r - window.row0) * window.width + first - window.column0;
-    GDALCopyWords64(bytes->data() + from * kind_.value_bytes, static_cast<GDALDataType>(kind_.type),
-                    static_cast<int>(kind_.value_bytes), values.data() + to, GDT_Float64,
-                    static_cast<int>(sizeof(double)), width);
+    copy_values(bytes->data() + from * kind_.value_bytes, values.data() + to, width);
     if (!mask.empty()) {
       std::copy_n(bytes->data() + mask_start + from, width, mask.data() + to);
     }
@@ -207,7 +240,7 @@ void RasterReader::read(const PixelWindow& window, std::span<double> values,
   QMPIPE_CHECK(values.size() == window.size());
   QMPIPE_CHECK(mask.size() == (mask_ == nullptr ? 0 : window.size()));
   if (!cache_) {
-    read_by_window(window, values, mask);
+    read_past_cache(window, values, mask);
     return;
   }
   const std::int64_t last_row = (window.row0 + window.height - 1) / info_.cached_height;

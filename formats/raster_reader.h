@@ -21,17 +21,33 @@ namespace qmpipe {
 // Fills in what `info` says about blocks, from a band whose driver and size it has already.
 void describe_blocks(GDALRasterBand& band, bool has_mask, RasterInfo& info);
 
+class RasterReader;
+
+// Is shown the values of blocks that come into the cache, in pieces. May throw what ends the reading.
+class BlockWatcher {
+ public:
+  virtual ~BlockWatcher() = default;
+  virtual bool wants(std::int64_t block) = 0;
+  // Masked ones are NaN. The values may be changed: nobody else has them.
+  virtual void see(std::span<double> values) = 0;
+  virtual void done(std::int64_t block, const RasterReader& reader) = 0;
+};
+
 class RasterReader {
  public:
-  // REQUIRES: describe_blocks() was done on `info`; band and info outlive the reader.
-  // `cache` may be null.
+  // REQUIRES: describe_blocks() was done on `info`; band, info and watcher outlive the reader.
+  // `cache` and `watcher` may be null; without a cache there is nothing to watch.
   RasterReader(GDALRasterBand& band, bool has_mask, const RasterInfo& info,
-               std::shared_ptr<SourceBlockCache> cache, std::uint32_t source_number);
+               std::shared_ptr<SourceBlockCache> cache, std::uint32_t source_number,
+               BlockWatcher* watcher);
 
   // Row by row from the top; `mask` is 0 where the value is void, and empty where the band has no
   // mask. REQUIRES: the window lies inside the raster; sizes fit. Throws IoError.
   void read(const PixelWindow& window, std::span<double> values,
             std::span<std::uint8_t> mask) const;
+  // The same, past the cache.
+  void read_past_cache(const PixelWindow& window, std::span<double> values,
+                       std::span<std::uint8_t> mask) const;
 
  private:
   struct Kind {
@@ -41,11 +57,12 @@ class RasterReader {
     bool mask_is_shaped_alike = false;
   };
 
-  void read_by_window(const PixelWindow& window, std::span<double> values,
-                      std::span<std::uint8_t> mask) const;
   void read_block(std::int64_t column, std::int64_t row, const PixelWindow& window,
                   std::span<double> values, std::span<std::uint8_t> mask) const;
   void decode(std::int64_t column, std::int64_t row, std::span<std::uint8_t> bytes) const;
+  void show(std::int64_t block, const PixelWindow& covered,
+            std::span<const std::uint8_t> bytes) const;
+  void copy_values(const std::uint8_t* from, double* to, std::int64_t count) const;
   void decode_file_blocks(GDALRasterBand& band, const PixelWindow& covered,
                           std::span<std::uint8_t> bytes) const;
   void raster_io(GDALRasterBand& band, const PixelWindow& window, int type, void* into,
@@ -57,6 +74,7 @@ class RasterReader {
   const RasterInfo& info_;
   std::shared_ptr<SourceBlockCache> cache_;
   std::uint32_t source_number_;
+  BlockWatcher* watcher_;
   Kind kind_;
 };
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <gdal_priv.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -11,7 +10,8 @@
 
 #include "formats/errors.h"
 #include "formats/gdal_session.h"
-#include "formats/height_unit.h"
+#include "formats/height_rule.h"
+#include "formats/height_watch.h"
 #include "formats/raster_crs.h"
 #include "formats/raster_dataset.h"
 #include "formats/raster_placement.h"
@@ -20,25 +20,6 @@
 
 namespace qmpipe {
 namespace {
-
-constexpr double kLargestHeight = 1e30;
-constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
-
-// How the band's raw values become metres.
-struct HeightRule {
-  double void_value = kVoid;  // NaN when none is declared: nothing equals it
-  bool has_mask = false;
-  double scale = 1;
-  double offset = 0;
-  double metres_per_unit = 1;
-
-  double height_m(double raw) const {
-    // Without branches, so that a row's worth is done several at a time. False for NaN.
-    const bool is_height = (std::abs(raw) <= kLargestHeight) & (raw != void_value);
-    const double height = (raw * scale + offset) * metres_per_unit;
-    return (is_height & (std::abs(height) <= kLargestHeight)) ? height : kVoid;
-  }
-};
 
 // None when the file has no geotransform and does not need one: in a plane without CRS.
 std::optional<PixelPlane> plane_of(GDALDataset& dataset, const std::string& path, CrsNeed need) {
@@ -70,65 +51,26 @@ std::optional<PixelPlane> plane_of(GDALDataset& dataset, const std::string& path
   return plane;
 }
 
-double void_value_of(GDALRasterBand& band) {
-  int is_set = 0;
-  const GDALDataType type = band.GetRasterDataType();
-  double value = 0;
-  if (type == GDT_Int64) {
-    value = static_cast<double>(band.GetNoDataValueAsInt64(&is_set));
-  } else if (type == GDT_UInt64) {
-    value = static_cast<double>(band.GetNoDataValueAsUInt64(&is_set));
-  } else {
-    value = band.GetNoDataValue(&is_set);
-  }
-  if (is_set == 0 || !(std::abs(value) <= kLargestHeight)) return kVoid;
-  // The file's own values went through a float.
-  if (type == GDT_Float32) value = static_cast<double>(static_cast<float>(value));
-  return value;
-}
-
-HeightRule height_rule_of(GDALRasterBand& band, const RasterCrs& crs, RasterInfo& info) {
-  HeightRule rule{.void_value = void_value_of(band)};
-  const int flags = band.GetMaskFlags();
-  rule.has_mask = (flags & GMF_ALL_VALID) == 0 && flags != GMF_NODATA;
-  const double scale = band.GetScale();
-  const double offset = band.GetOffset();
-  if (std::isfinite(scale) && scale != 0 && std::isfinite(offset)) {
-    rule.scale = scale;
-    rule.offset = offset;
-  } else {
-    info.assumptions.push_back(fmt::format(
-        "the band's scale {} and offset {} make no sense and are ignored", scale, offset));
-  }
-  info.unit = band.GetUnitType() != nullptr ? band.GetUnitType() : "";
-  if (info.unit.empty() && !crs.vertical_unit.empty()) {
-    info.unit = crs.vertical_unit;
-    rule.metres_per_unit = crs.vertical_metres_per_unit;
-  } else if (const std::optional<double> metres = metres_per_unit(info.unit)) {
-    rule.metres_per_unit = *metres;
-  } else {
-    info.assumptions.push_back("the unit of height '" + info.unit +
-                               "' is unknown; metres are taken");
-  }
-  if (info.unit.empty()) info.unit = "m";
-  info.metres_per_unit = rule.metres_per_unit;
-  return rule;
-}
-
 }  // namespace
 
 struct RasterSource::Impl {
   OpenedRaster opened;
   GDALRasterBand* band = nullptr;
   RasterInfo info;
+  HeightOptions height_options;
   HeightRule rule;
   // Where it is placed on the globe.
   std::optional<RasterGrid> grid;
+  std::optional<HeightWatch> watch;
   std::optional<RasterReader> reader;
+  // Without a cache every read is taken for a new block.
+  bool watches_reads = false;
+  std::int64_t reads = 0;
   // Kept between reads.
   std::vector<std::uint8_t> mask;
 
   void describe(const std::string& path);
+  void take_heights(const RasterCrs& crs);
   void place_in_plane(const RasterCrs& crs);
   void place_on_globe(const RasterCrs& crs);
 };
@@ -158,7 +100,8 @@ void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
   info.crs_name = crs.name;
   info.crs_wkt = crs.text.wkt;
   info.is_geographic = crs.is_geographic;
-  info.has_vertical_datum = crs.has_vertical_datum;
+  info.height_reference = crs.vertical.reference;
+  info.vertical_name = crs.vertical.name;
   info.assumptions.insert(info.assumptions.end(), crs.assumptions.begin(), crs.assumptions.end());
   const CrsNeed need = crs.text.wkt.empty() ? CrsNeed::kOptional : CrsNeed::kRequired;
   const std::optional<PixelPlane> given = plane_of(*opened.dataset, info.path, need);
@@ -168,7 +111,15 @@ void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
   if (!given) {
     info.assumptions.emplace_back("the file has no geotransform; a pixel is taken as a metre");
   }
-  rule = height_rule_of(*band, crs, info);
+}
+
+void RasterSource::Impl::take_heights(const RasterCrs& crs) {
+  RuledHeights heights = height_rule_of(*band, info.driver, crs, height_options);
+  rule = std::move(heights.rule);
+  info.unit = std::move(heights.unit);
+  info.metres_per_unit = rule.metres_per_unit;
+  info.assumptions.insert(info.assumptions.end(), heights.assumptions.begin(),
+                          heights.assumptions.end());
 }
 
 void RasterSource::Impl::place_on_globe(const RasterCrs& crs) {
@@ -201,20 +152,29 @@ std::unique_ptr<RasterSource> RasterSource::open(const std::string& path,
   const GdalSession quiet;
   auto impl = std::make_unique<Impl>();
   impl->opened = open_dataset(path);
+  impl->height_options = options.heights;
   impl->describe(path);
   if (options.placement) {
     impl->info.placement = options.placement;
     impl->place_in_plane(options.placement->crs);
+    impl->take_heights(options.placement->crs);
   } else {
     const bool on_globe = options.placing == Placing::kGlobe;
     const RasterCrs crs =
         crs_of(*impl->opened.dataset, path, impl->opened.name, options.crs_override,
                on_globe ? CrsNeed::kRequired : CrsNeed::kOptional);
     impl->place_in_plane(crs);
+    impl->take_heights(crs);
     if (on_globe) impl->place_on_globe(crs);
   }
   describe_blocks(*impl->band, impl->rule.has_mask, impl->info);
-  impl->reader.emplace(*impl->band, impl->rule.has_mask, impl->info, options.cache, options.number);
+  if (options.tally) {
+    impl->watch.emplace(options.tally, options.number, impl->rule, impl->info,
+                        impl->height_options);
+  }
+  impl->reader.emplace(*impl->band, impl->rule.has_mask, impl->info, options.cache, options.number,
+                       impl->watch ? &*impl->watch : nullptr);
+  impl->watches_reads = impl->watch && !options.cache;
   return std::unique_ptr<RasterSource>(new RasterSource(std::move(impl)));
 }
 
@@ -230,11 +190,14 @@ void RasterSource::read(const PixelWindow& window, std::span<double> out) const 
   QMPIPE_CHECK(window.row0 >= 0 && window.row0 + window.height <= impl.info.height);
   impl.mask.resize(impl.rule.has_mask ? out.size() : 0);
   impl.reader->read(window, out, impl.mask);
-  for (double& value : out) value = impl.rule.height_m(value);
-  if (!impl.rule.has_mask) return;
-  for (std::size_t k = 0; k < out.size(); ++k) {
-    if (impl.mask[k] == 0) out[k] = kVoid;
+  for (std::size_t k = 0; k < impl.mask.size(); ++k) {
+    if (impl.mask[k] == 0) out[k] = std::numeric_limits<double>::quiet_NaN();
   }
+  if (impl.watches_reads && impl.watch->wants(impl.reads)) {
+    impl.watch->see(out);
+    impl.watch->done(impl.reads++, *impl.reader);
+  }
+  impl.rule.apply(out);
 }
 
 void set_gdal_cache_bytes(std::int64_t bytes) { GDALSetCacheMax64(bytes); }

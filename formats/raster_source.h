@@ -1,7 +1,8 @@
 // One digital elevation model, read through GDAL: any format, any CRS.
 //
 // Guarantees: heights in metres (band scale, offset and unit applied); voids are NaN, whatever the
-// file calls them (declared void value, NaN, infinities, |h| > 1e30, mask band).
+// file calls them (declared void value, NaN, infinities, |h| > 1e30, mask band), and whatever the
+// user says is one.
 // A RasterSource is used by one thread at a time (GDAL < 3.10); open one for each thread.
 //
 // Pixel coordinates are those of raster_grid.h; files that say "point" are shifted to this convention
@@ -15,8 +16,11 @@
 #include <string>
 #include <vector>
 
+#include "formats/height_options.h"
+#include "formats/height_tally.h"
 #include "formats/raster_grid.h"
 #include "formats/source_block_cache.h"
+#include "formats/vertical_crs.h"
 
 namespace qmpipe {
 
@@ -26,9 +30,11 @@ struct RasterInfo : GridInfo {
   std::string crs_name;
   std::string crs_wkt;  // of x and y; empty: unknown
   bool is_geographic = false;
-  bool has_vertical_datum = false;  // the CRS is compound or 3D
-  std::string type_name;            // GDAL's name of the band's type, e.g. "Int16"
-  std::string unit;                 // as the band declares it, "m" when it is silent
+  // Above what the CRS says that heights are, and its name for it.
+  HeightReference height_reference = HeightReference::kUnknown;
+  std::string vertical_name;
+  std::string type_name;  // GDAL's name of the band's type, e.g. "Int16"
+  std::string unit;       // as the band declares it, "m" when it is silent
   double metres_per_unit = 1;
   std::int64_t block_width = 0;
   std::int64_t block_height = 0;
@@ -55,6 +61,11 @@ struct OpenOptions {
   // Taken instead of the file's CRS; anything GDAL understands (EPSG:n, WKT, PROJ, a .prj file).
   // DEFAULT: empty, the file's own.
   std::string crs_override = {};
+  // DEFAULT: what the file says.
+  HeightOptions heights = {};
+  // Is shown all values that are read; without a cache, in windows that must not overlap then.
+  // DEFAULT: none.
+  std::shared_ptr<HeightTally> tally = {};
   // Where decoded blocks are shared with other handles on the same file. DEFAULT: none, GDAL's own
   // cache, which knows only one handle's.
   std::shared_ptr<SourceBlockCache> cache = {};
@@ -87,7 +98,8 @@ class RasterSource {
   }
 
   // Reads a window that lies inside the raster, row by row from the top, voids as NaN.
-  // REQUIRES: out.size() == window.size(). Throws IoError when the file cannot be read there.
+  // REQUIRES: out.size() == window.size(). Throws IoError when the file cannot be read there, and
+  // when the tally does not allow what stands there.
   void read(const PixelWindow& window, std::span<double> out) const;
 
  private:

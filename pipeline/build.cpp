@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <memory>
 #include <set>
 #include <utility>
 #include <vector>
@@ -21,6 +22,7 @@
 #include "pipeline/process_memory.h"
 #include "pipeline/run_record.h"
 #include "pipeline/scratch_folder.h"
+#include "pipeline/source_notes.h"
 #include "pipeline/survey.h"
 #include "pipeline/version.h"
 
@@ -38,6 +40,8 @@ void require_sound(const BuildOptions& options) {
 SurveyOptions survey_options(const BuildOptions& options) {
   return {.inputs = options.input.paths,
           .source_crs = options.input.source_crs,
+          .heights = options.input.heights,
+          .tally = std::make_shared<HeightTally>(options.input.guard),
           .resampling = options.input.resampling,
           .reduction = options.mesh.reduction,
           .scheme = TilingScheme(options.mesh.projection),
@@ -55,24 +59,6 @@ void require_a_zoom(const BuildOptions& options, std::int32_t deepest_zoom) {
       "--min-zoom {} is deeper than the deepest zoom, which is {} for pixels of this size; give "
       "--min-zoom {} or less, or --max-zoom {} to interpolate between the pixels",
       min_zoom, deepest_zoom, deepest_zoom, min_zoom));
-}
-
-// Tells what the sources leave open, so that a wrong guess does not go unnoticed.
-void note_assumptions(const std::vector<RasterInfo>& sources, Progress& progress) {
-  bool any_datum = true;
-  std::set<std::string> said;
-  for (const RasterInfo& source : sources) {
-    for (const std::string& assumption : source.assumptions) {
-      if (said.insert(assumption).second) progress.note(source.path + ": " + assumption);
-    }
-    any_datum = any_datum && source.has_vertical_datum;
-  }
-  if (!any_datum) {
-    progress.note(
-        "heights are written as they are: the input names no vertical datum, so they are taken as "
-        "heights above the WGS84 ellipsoid (heights above sea level will stand off by the geoid's "
-        "height, up to 100 m)");
-  }
 }
 
 // Reducing is what makes coarse posts right, so a smaller --max-zoom does not spare it.
@@ -246,6 +232,7 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
   place_store(to_survey, share, options, place, progress);
   const Survey survey = run_survey(to_survey, sources, progress);
   give_back_freed_memory();
+  note_findings(*to_survey.tally, to_survey.heights, progress);
   require_data(survey);
   const BuildPlan plan = plan_build(options, survey);
   for (const std::string& note : plan.notes) progress.note(note);
@@ -323,7 +310,7 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
     return result;
   }
   require_a_zoom(options, options.mesh.max_zoom.value_or(chosen_sampling_zoom(to_survey, sources)));
-  note_assumptions(sources, progress);
+  note_sources(sources, progress);
   note_sampling(to_survey, sources, progress);
   // Refuses what cannot work before anything is made on disk.
   share_memory(memory_request(options), to_survey, sources);

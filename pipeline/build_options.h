@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "formats/folder_sink.h"
+#include "formats/height_tally.h"
 #include "pipeline/recipe.h"
 
 namespace qmpipe {
@@ -18,6 +19,10 @@ struct InputOptions {
   std::vector<std::string> paths;
   // Overrides the CRS of all inputs; anything GDAL understands. DEFAULT: the inputs' own.
   std::string source_crs;
+  // What the numbers of all inputs mean. DEFAULT: what the files say.
+  HeightOptions heights = {};
+  // DEFAULT: heights that Earth does not have end the run.
+  HeightGuard guard = HeightGuard::kStop;
   // DEFAULT: bilinear.
   Resampling resampling = Resampling::kBilinear;
 };

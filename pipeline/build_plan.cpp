@@ -44,6 +44,7 @@ Recipe recipe_for(const BuildOptions& options, const Survey& survey) {
   recipe.min_zoom = options.mesh.min_zoom;
   recipe.max_zoom = survey.max_zoom;
   recipe.source_crs = options.input.source_crs;
+  recipe.heights = options.input.heights;
   recipe.resampling = options.input.resampling;
   recipe.reduction = options.mesh.reduction;
   recipe.voids = settled_policy(options.mesh.voids, survey);

@@ -81,7 +81,8 @@ void try_all(const CompareOptions& options, Comparison& comparison, Progress& pr
   }
   const SourceOptions source = {.inputs = options.build.input.paths,
                                 .source_crs = options.build.input.source_crs,
-                                .threads = options.build.run.threads};
+                                .threads = options.build.run.threads,
+                                .heights = options.build.input.heights};
   const TilingScheme scheme(options.build.mesh.projection);
   const auto posts = open_source_posts(source, scheme, comparison.methods.front().recipe, progress);
   const std::optional<WindowHeights> window = posts->posts(*comparison.tile);

@@ -13,6 +13,7 @@
 #include "formats/errors.h"
 #include "formats/raster_source.h"
 #include "pipeline/dem.h"
+#include "pipeline/source_notes.h"
 #include "pipeline/stopwatch.h"
 #include "stages/detail_block.h"
 #include "stages/detail_simplify.h"
@@ -88,10 +89,15 @@ void note_assumptions(const std::string& path, const std::vector<std::string>& a
 Input read_dem_input(const DetailBuildOptions& options, Progress& progress,
                      DetailBuildReport& report) {
   Stopwatch watch;
-  const std::unique_ptr<RasterSource> source = RasterSource::open(
-      options.input, {.crs_override = options.points.source_crs, .placing = Placing::kPlane});
+  const auto tally = std::make_shared<HeightTally>(options.guard);
+  const std::unique_ptr<RasterSource> source =
+      RasterSource::open(options.input, {.crs_override = options.points.source_crs,
+                                         .heights = options.heights,
+                                         .tally = tally,
+                                         .placing = Placing::kPlane});
   const Dem dem = read_dem(*source);
   note_assumptions(options.input, dem.info.assumptions, progress);
+  note_findings(*tally, options.heights, progress);
   Input input;
   input.frame = frame_of(dem, options.height_step_m);
   input.crs_wkt = dem.info.crs_wkt;
@@ -109,6 +115,10 @@ Input read_dem_input(const DetailBuildOptions& options, Progress& progress,
 
 Input read_cloud_input(const DetailBuildOptions& options, Progress& progress,
                        DetailBuildReport& report) {
+  if (!options.heights.is_default()) {
+    throw UsageError(fmt::format("{} are for rasters, and {} holds points; leave them out",
+                                 text_of(options.heights), options.input));
+  }
   Stopwatch watch;
   const PointCloud cloud = read_point_cloud(options.input, options.points);
   note_assumptions(options.input, cloud.assumptions, progress);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "formats/detail_data.h"
+#include "formats/height_tally.h"
 #include "formats/point_cloud.h"
 #include "pipeline/progress.h"
 #include "stages/detail_base.h"
@@ -17,6 +18,9 @@ struct DetailBuildOptions {
   std::string input;
   // How points are read; the CRS counts for DEMs too.
   PointReadOptions points = {};
+  // Of a DEM.
+  HeightOptions heights = {};
+  HeightGuard guard = HeightGuard::kStop;
   // Part of the triangles that the coarsest level keeps. DEFAULT: 0.2, as in the paper.
   double keep_share = 0.2;
   // DEFAULT: 4, as in the paper.

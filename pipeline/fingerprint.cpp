@@ -7,6 +7,7 @@
 
 #include "formats/hash64.h"
 #include "formats/raster_files.h"
+#include "pipeline/height_json.h"
 #include "pipeline/version.h"
 
 namespace qmpipe {
@@ -53,6 +54,8 @@ json parameters_of(const BuildOptions& options) {
       {"--tolerance-at", tolerance_at},
       {"--gzip", options.encode.gzip_level ? json(*options.encode.gzip_level) : json("none")},
       {"normals", options.encode.normals}};
+  const json heights = json::parse(write_heights(options.input.heights));
+  for (const auto& [name, value] : heights.items()) parameters["--" + name] = value;
   for (const ParameterInfo& info : parameters_of(mesh.method, mesh.stop)) {
     parameters[info.name] = mesh.parameters.of(info.name).text();
   }

@@ -8,6 +8,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/height_json.h"
+
 namespace qmpipe {
 namespace {
 
@@ -110,6 +112,17 @@ void read_named(const json& object, const char* name, Result<Value> (*parse)(con
   }
 }
 
+void read_heights(const json& object, HeightOptions& into, std::string& problem) {
+  const auto it = object.find("heights");
+  if (it == object.end()) return;
+  const Result<HeightOptions> heights = parse_heights(it->dump());
+  if (heights) {
+    into = *heights;
+  } else {
+    problem = heights.error().message;
+  }
+}
+
 Result<Projection> projection_named(const std::string& name) {
   if (name == "geodetic") return Projection::kGeodetic;
   if (name == "mercator") return Projection::kMercator;
@@ -193,23 +206,23 @@ MethodOptions Recipe::options_for(const TileKey& key, const HeightSteps& steps) 
 }
 
 std::string write_recipe(const Recipe& recipe) {
-  const json object = {
-      {"program_version", recipe.program_version},
-      {"scheme", recipe.projection == Projection::kGeodetic ? "geodetic" : "mercator"},
-      {"sampling_zoom", recipe.sampling_zoom},
-      {"min_zoom", recipe.min_zoom},
-      {"max_zoom", recipe.max_zoom},
-      {"source_crs", recipe.source_crs},
-      {"resampling", name_of(recipe.resampling)},
-      {"reduce", name_of(recipe.reduction)},
-      {"nodata", name_of(recipe.voids)},
-      {"nodata_base_zoom", recipe.voids.base_zoom},
-      {"method", name_of(recipe.method)},
-      {"tolerance_m", recipe.tolerance_m},
-      {"height_step_m", recipe.height_step_m},
-      {"stop", name_of(recipe.stop)},
-      {"parameters", recipe.parameters},
-      {"normals", recipe.normals}};
+  json object = {{"program_version", recipe.program_version},
+                 {"scheme", recipe.projection == Projection::kGeodetic ? "geodetic" : "mercator"},
+                 {"sampling_zoom", recipe.sampling_zoom},
+                 {"min_zoom", recipe.min_zoom},
+                 {"max_zoom", recipe.max_zoom},
+                 {"source_crs", recipe.source_crs},
+                 {"resampling", name_of(recipe.resampling)},
+                 {"reduce", name_of(recipe.reduction)},
+                 {"nodata", name_of(recipe.voids)},
+                 {"nodata_base_zoom", recipe.voids.base_zoom},
+                 {"method", name_of(recipe.method)},
+                 {"tolerance_m", recipe.tolerance_m},
+                 {"height_step_m", recipe.height_step_m},
+                 {"stop", name_of(recipe.stop)},
+                 {"parameters", recipe.parameters},
+                 {"normals", recipe.normals}};
+  if (!recipe.heights.is_default()) object["heights"] = json::parse(write_heights(recipe.heights));
   return object.dump();
 }
 
@@ -224,6 +237,7 @@ Result<Recipe> parse_recipe(const std::string& text) {
   read_member(object, "min_zoom", recipe.min_zoom, problem);
   read_member(object, "max_zoom", recipe.max_zoom, problem);
   read_member(object, "source_crs", recipe.source_crs, problem);
+  read_heights(object, recipe.heights, problem);
   read_named(object, "resampling", resampling_named, recipe.resampling, problem);
   read_named(object, "reduce", reduction_named, recipe.reduction, problem);
   read_named(object, "nodata", void_policy_named, recipe.voids, problem);

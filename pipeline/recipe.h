@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/height_options.h"
 #include "formats/result.h"
 #include "pipeline/method.h"
 #include "scheduler/tiling_scheme.h"
@@ -28,6 +29,7 @@ struct Recipe {
   std::int32_t min_zoom = 0;
   std::int32_t max_zoom = 0;
   std::string source_crs;  // in place of the inputs' own; empty: their own
+  HeightOptions heights;   // likewise
   Resampling resampling = Resampling::kBilinear;
   Reduction reduction = Reduction::kMean;
   VoidPolicy voids;

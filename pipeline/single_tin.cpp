@@ -96,12 +96,19 @@ SingleTin make_single_tin(const SingleTinOptions& options) {
   const TinMethod method = {options.method, options.stop,
                             values_at(options.parameters, options.method, options.stop, 0)};
   Stopwatch watch;
-  const std::unique_ptr<RasterSource> source = RasterSource::open(
-      options.input, {.crs_override = options.source_crs, .placing = Placing::kPlane});
+  const auto tally = std::make_shared<HeightTally>(options.guard);
+  const std::unique_ptr<RasterSource> source =
+      RasterSource::open(options.input, {.crs_override = options.source_crs,
+                                         .heights = options.heights,
+                                         .tally = tally,
+                                         .placing = Placing::kPlane});
   post_spacing(source->info());
   require_memory(options, source->info());
   SingleTin single;
   single.dem = read_dem(*source);
+  for (const HeightFinding& finding : tally->findings(options.heights)) {
+    single.dem.info.assumptions.push_back(finding.text);
+  }
   single.read_s = watch.lap();
   single.result = simplify_to_target(single.dem, method, options.target);
   single.simplify_s = watch.seconds();

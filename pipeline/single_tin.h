@@ -22,6 +22,8 @@ struct SingleTinOptions {
   std::string input;
   // As in OpenOptions. DEFAULT: empty, the file's own.
   std::string source_crs = {};
+  HeightOptions heights = {};
+  HeightGuard guard = HeightGuard::kStop;
   Method method = Method::kGreedy;
   Stop stop = Stop::kTolerance;
   // Their values at zoom 0 count.

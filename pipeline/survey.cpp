@@ -35,10 +35,13 @@ constexpr std::size_t kManyTiles = 2000;
 std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options,
                                       const std::shared_ptr<const std::vector<RasterInfo>>& sources,
                                       const std::shared_ptr<SourceBlockCache>& cache) {
-  return std::make_unique<Sampler>(
-      SourcePool(sources, {.crs_override = options.source_crs, .cache = cache},
-                 options.open_sources),
-      options.resampling);
+  return std::make_unique<Sampler>(SourcePool(sources,
+                                              {.crs_override = options.source_crs,
+                                               .heights = options.heights,
+                                               .tally = options.tally,
+                                               .cache = cache},
+                                              options.open_sources),
+                                   options.resampling);
 }
 
 // Runs body(k) for 0 <= k < count on the arena's threads, which take one k after the other, so that
@@ -324,8 +327,9 @@ std::vector<RasterInfo> describe_inputs(const SurveyOptions& options) {
   for_each_in_order(arena, options.threads, infos.size(), [&](std::size_t k) {
     if (k > first_wrong) return;
     try {
-      infos[k] =
-          RasterSource::open(options.inputs[k], {.crs_override = options.source_crs})->info();
+      infos[k] = RasterSource::open(options.inputs[k], {.crs_override = options.source_crs,
+                                                        .heights = options.heights})
+                     ->info();
     } catch (...) {
       errors[k] = std::current_exception();
       std::size_t before = first_wrong;

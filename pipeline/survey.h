@@ -29,6 +29,9 @@ namespace qmpipe {
 struct SurveyOptions {
   std::vector<std::string> inputs = {};  // in order of priority
   std::string source_crs = {};           // overrides the inputs' CRS when not empty
+  HeightOptions heights = {};            // of the inputs
+  // Is shown the values that are read. DEFAULT: none.
+  std::shared_ptr<HeightTally> tally = {};
   Resampling resampling = Resampling::kBilinear;
   Reduction reduction = Reduction::kMean;
   TilingScheme scheme{Projection::kGeodetic};

@@ -126,9 +126,11 @@ void Verification::read_recipe() {
 
 void Verification::open_source() {
   if (options_.sources.empty()) return;
-  source_ = open_source_posts(
-      {.inputs = options_.sources, .source_crs = options_.source_crs, .threads = options_.threads},
-      layer_.scheme, recipe_, progress_);
+  source_ = open_source_posts({.inputs = options_.sources,
+                               .source_crs = options_.source_crs,
+                               .threads = options_.threads,
+                               .heights = options_.heights},
+                              layer_.scheme, recipe_, progress_);
 }
 
 void Verification::look_for_expected_tiles(const std::vector<TileKey>& keys) {

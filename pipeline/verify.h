@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/height_options.h"
 #include "formats/tile_set.h"
 #include "pipeline/finding.h"
 #include "pipeline/hausdorff.h"
@@ -28,6 +29,8 @@ struct VerifyOptions {
   std::vector<std::string> sources = {};
   // Overrides the sources' CRS. DEFAULT: what the set was built with, else the sources' own.
   std::string source_crs = {};
+  // What the sources' numbers mean. DEFAULT: what the set was built with, one by one.
+  HeightOptions heights = {};
   // REQUIRES sources. DEFAULT: skipped.
   HausdorffMode hausdorff = HausdorffMode::kSkipped;
   std::int32_t threads = 1;

@@ -101,9 +101,9 @@ class SampledPosts final : public SourcePosts {
 
  private:
   std::unique_ptr<Sampler> open_sampler(const SourceOptions& options) const {
-    return std::make_unique<Sampler>(SourcePool(sources_, {.crs_override = options.source_crs},
-                                                sources_open_at_once(options.threads)),
-                                     Resampling::kBilinear);
+    const OpenOptions open = {.crs_override = options.source_crs, .heights = options.heights};
+    return std::make_unique<Sampler>(
+        SourcePool(sources_, open, sources_open_at_once(options.threads)), Resampling::kBilinear);
   }
 
   std::shared_ptr<const std::vector<RasterInfo>> sources_;
@@ -122,6 +122,7 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
   survey.threads = options.threads;
   survey.open_sources = sources_open_at_once(options.threads);
   if (recipe && survey.source_crs.empty()) survey.source_crs = recipe->source_crs;
+  survey.heights = recipe ? options.heights.or_else(recipe->heights) : options.heights;
   // An input that cannot be opened is told before work starts.
   std::vector<RasterInfo> sources = describe_inputs(survey);
   if (!recipe) return std::make_unique<SampledPosts>(options, std::move(sources), scheme);

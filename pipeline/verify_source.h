@@ -37,6 +37,8 @@ struct SourceOptions {
   std::vector<std::string> inputs;
   std::string source_crs;  // overrides the inputs' CRS when not empty
   std::int32_t threads = 1;
+  // In place of the recipe's, one by one.
+  HeightOptions heights = {};
 };
 
 // Throws IoError for an input that cannot be used, Interrupted when asked to stop.

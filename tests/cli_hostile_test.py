@@ -23,7 +23,7 @@ COMMANDS = (["build"], ["verify"], ["serve"], ["check"], ["compare"], ["convert"
 # Of the help: the type names of options that take a number (tools/number_options.h), and of others.
 NUMBERS = re.compile(r"(INT|UINT|FLOAT|SECONDS|X,Y,Z|[A-Z])$")
 TEXTS = {"TEXT", "OUT", "CRS", "SIZE", "FILE", "DIR", "MESH", "HTML", "REPORT", "LIST", "SHARE",
-         "INPUT", "NAME=VALUE", "Z=M,...", "ZOOM/X/Y", "LEVEL|none", "ADDRESS", "ORIGIN", "HOW"}
+         "INPUT", "VALUES", "NAME=VALUE", "Z=M,...", "ZOOM/X/Y", "LEVEL|none", "ADDRESS", "ORIGIN", "HOW"}
 OPTION = re.compile(r"^  (?:-\w,)?(--[\w-]+) (NAME=VALUE|Z=M,\.\.\.|[A-Z][A-Z,/]*(?:\|none)?)(?=[\s:=])",
                     re.MULTILINE)
 

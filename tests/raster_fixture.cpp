@@ -38,6 +38,9 @@ void describe(GDALRasterBand& band, const RasterFixture& fixture) {
   if (fixture.scale != 1) band.SetScale(fixture.scale);
   if (fixture.offset != 0) band.SetOffset(fixture.offset);
   if (!fixture.unit.empty()) band.SetUnitType(fixture.unit.c_str());
+  for (const auto& [name, value] : fixture.band_metadata) {
+    band.SetMetadataItem(name.c_str(), value.c_str());
+  }
 }
 
 void fill(GDALDataset& dataset, const RasterFixture& fixture) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -29,6 +30,7 @@ struct RasterFixture {
   double scale = 1;
   double offset = 0;
   std::string unit = {};
+  std::map<std::string, std::string> band_metadata = {};
   PixelIs pixel_is = PixelIs::kArea;
   std::vector<std::string> creation_options = {};
   // Raw value of pixel (column, row). DEFAULT: 10 row + column.

@@ -346,12 +346,12 @@ TEST(RasterSource, VerticalPartOfTheCrsIsNotInTheWay) {
   RasterFixture fixture;
   fixture.crs = "EPSG:4326+5773";
   const auto source = open_fixture(file_in(folder, "a.tif"), fixture);
-  EXPECT_TRUE(source->info().has_vertical_datum);
+  EXPECT_EQ(source->info().height_reference, HeightReference::kDatum);
   EXPECT_TRUE(source->info().is_geographic);
   EXPECT_EQ(source->pixel_at(12, 49)->column, 2);
   fixture.crs = "EPSG:4979";
   const auto with_height = open_fixture(file_in(folder, "b.tif"), fixture);
-  EXPECT_TRUE(with_height->info().has_vertical_datum);
+  EXPECT_EQ(with_height->info().height_reference, HeightReference::kEllipsoid);
   EXPECT_TRUE(with_height->info().is_separable);
 }
 

@@ -63,6 +63,7 @@ void print_effective(const BuildOptions& options) {
   for (const auto& [zoom, metres] : mesh.tolerance_at_m) {
     text += fmt::format("  tolerance-at   {}={} m\n", zoom, metres);
   }
+  text += "  heights        " + heights_text(options.input.heights) + "\n";
   text += fmt::format(
       "  resampling     {}\n  reduce         {}\n  nodata         {}\n"
       "  normals        {}\n  gzip           {}\n  threads        {}\n  memory         {}\n"

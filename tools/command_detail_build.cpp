@@ -15,6 +15,7 @@
 #include "pipeline/machine_share.h"
 #include "pipeline/process_memory.h"
 #include "tools/detail_commands.h"
+#include "tools/height_arguments.h"
 #include "tools/interrupt.h"
 #include "tools/number_options.h"
 
@@ -37,6 +38,7 @@ constexpr const char* kFooter =
 
 struct BuildArguments {
   DetailBuildOptions options;
+  HeightArguments heights;
   std::string output;
   std::string keep = "20%";
   std::string classes;
@@ -102,6 +104,8 @@ int run_build(BuildArguments arguments) {
   if (!arguments.classes.empty()) {
     arguments.options.points.classes = parse_point_classes(arguments.classes);
   }
+  arguments.options.heights = to_height_options(arguments.heights);
+  arguments.options.guard = to_height_guard(arguments.heights);
   require_folder_of(arguments.output, "cannot write the model");
   ProgressStyle style =
       ::isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent;
@@ -178,6 +182,8 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
       ->add_option("--source-crs", options.points.source_crs,
                    "Take this CRS instead of the one that the input names (EPSG:n, WKT, PROJ)")
       ->type_name("CRS");
+  add_height_options(*command, arguments->heights);
+  add_height_guard(*command, arguments->heights);
   command->add_option("--threads", options.threads, "Threads, each with a block of its own")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();

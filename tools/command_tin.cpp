@@ -15,6 +15,7 @@
 #include "pipeline/process_memory.h"
 #include "pipeline/single_tin.h"
 #include "pipeline/stopwatch.h"
+#include "tools/height_arguments.h"
 #include "tools/method_arguments.h"
 #include "tools/parse_values.h"
 #include "tools/pyramid_arguments.h"
@@ -44,6 +45,7 @@ struct TinArguments {
   std::string input;
   std::string output;
   std::string source_crs;
+  HeightArguments heights;
   MethodArguments method;
   double tolerance_m = 0;
   bool tolerance_given = false;
@@ -85,6 +87,8 @@ SingleTinOptions to_options(const TinArguments& arguments) {
   const MethodChoice choice = to_choice(arguments.method, short_forms, options.parameters);
   options.input = arguments.input;
   options.source_crs = arguments.source_crs;
+  options.heights = to_height_options(arguments.heights);
+  options.guard = to_height_guard(arguments.heights);
   options.method = choice.method;
   options.stop = choice.stop;
   options.parameters = choice.parameters;
@@ -101,9 +105,10 @@ void print_effective(const TinArguments& arguments, const SingleTinOptions& opti
   const MethodChoice choice = {options.method, options.stop, options.parameters};
   std::string text = fmt::format(
       "effective options:\n  input          {}\n  output         {}\n  source-crs     {}\n"
-      "  method         {}\n",
+      "  heights        {}\n  method         {}\n",
       options.input, arguments.output,
-      options.source_crs.empty() ? "(the file's)" : options.source_crs, text_of(choice));
+      options.source_crs.empty() ? "(the file's)" : options.source_crs,
+      heights_text(options.heights), text_of(choice));
   text += effective_parameters(choice);
   if (options.target.tolerance_m) {
     text += fmt::format("  tolerance      {} m\n", *options.target.tolerance_m);
@@ -261,6 +266,8 @@ void add_options(CLI::App& command, TinArguments& arguments) {
                   "CRS of the input, in place of its own (EPSG:32605, a .prj file, WKT). Without "
                   "any, coordinates are metres")
       ->type_name("CRS");
+  add_height_options(command, arguments.heights);
+  add_height_guard(command, arguments.heights);
   add_memory_option(command, arguments.memory);
   command.add_flag("--json", arguments.json, "Print the statistics as JSON");
   command.add_flag("-v,--verbose", arguments.verbose, "Print every effective option first");

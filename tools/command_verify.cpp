@@ -11,6 +11,7 @@
 #include "pipeline/machine_share.h"
 #include "pipeline/progress.h"
 #include "pipeline/verify.h"
+#include "tools/height_arguments.h"
 #include "tools/interrupt.h"
 #include "tools/number_options.h"
 
@@ -51,12 +52,14 @@ constexpr const char* kFooter =
 struct VerifyArguments {
   std::string path;
   VerifyOptions options;
+  HeightArguments heights;
   bool wants_hausdorff = false;
   bool wants_json = false;
 };
 
 int run_verify(VerifyArguments arguments) {
   if (arguments.wants_hausdorff) arguments.options.hausdorff = HausdorffMode::kMeasured;
+  arguments.options.heights = to_height_options(arguments.heights);
   const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
   Progress progress(is_terminal ? ProgressStyle::kTerminal : ProgressStyle::kSilent,
                     stop_flag_of_signals());
@@ -89,6 +92,7 @@ void register_verify(CLI::App& app, std::function<int()>& action) {
       ->add_option("--source-crs", options.source_crs,
                    "Take this CRS instead of the one that the sources name (EPSG:n, WKT, PROJ)")
       ->type_name("CRS");
+  add_height_options(*command, arguments->heights);
   command->add_flag("--hausdorff", arguments->wants_hausdorff,
                     "Measure the symmetric Hausdorff distance too (needs --source)");
   command->add_option("--threads", options.threads, "Threads; the report does not depend on them")

@@ -19,6 +19,8 @@ void add_input_options(CLI::App& command, PyramidArguments& arguments) {
       .add_option("--source-crs", arguments.options.input.source_crs,
                   "CRS of the inputs, in place of their own (EPSG:32605, a .prj file, WKT)")
       ->type_name("CRS");
+  add_height_options(command, arguments.heights);
+  add_height_guard(command, arguments.heights);
   command
       .add_option("--resampling", arguments.resampling,
                   "How a post is read between pixels: bilinear, cubic or nearest")
@@ -96,6 +98,8 @@ BuildOptions to_build_options(const PyramidArguments& arguments) {
   BuildOptions options = arguments.options;
   options.mesh.projection =
       arguments.scheme == "mercator" ? Projection::kMercator : Projection::kGeodetic;
+  options.input.heights = to_height_options(arguments.heights);
+  options.input.guard = to_height_guard(arguments.heights);
   options.input.resampling = understood("--resampling", resampling_named(arguments.resampling));
   options.mesh.reduction = understood("--reduce", reduction_named(arguments.reduction));
   options.mesh.voids = understood("--nodata", void_policy_named(arguments.voids));

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "pipeline/build_options.h"
+#include "tools/height_arguments.h"
 #include "tools/method_arguments.h"
 
 namespace CLI {
@@ -17,6 +18,7 @@ namespace qmpipe {
 // The words as typed, before they are understood.
 struct PyramidArguments {
   BuildOptions options;
+  HeightArguments heights;
   std::string scheme = "geodetic";
   std::string resampling = name_of(Resampling::kBilinear);
   std::string reduction = name_of(Reduction::kMean);

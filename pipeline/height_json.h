@@ -1,0 +1,15 @@
+// HeightOptions as JSON text: in the recipe of layer.json and in fingerprints.
+#pragma once
+
+#include <string>
+
+#include "formats/height_options.h"
+#include "formats/result.h"
+
+namespace qmpipe {
+
+// An object with what differs from the default, under the names of the options: {"void":"-9999"}.
+std::string write_heights(const HeightOptions& heights);
+Result<HeightOptions> parse_heights(const std::string& text);
+
+}  // namespace qmpipe
