@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <numbers>
 #include <type_traits>
 #include <utility>
 
@@ -22,6 +23,36 @@ using Factory =
 
 bool is_finite(const PJ_COORD& c) { return std::isfinite(c.v[0]) && std::isfinite(c.v[1]); }
 
+constexpr int kLongitudes = 24;
+// So that none is where x jumps, half a turn from somebody's central meridian.
+constexpr double kFirstStep = 0.3713;
+constexpr std::array<double, 4> kParallelsOfTurn = {-0.16, -0.05, 0.05, 0.16};
+// Of a turn: x of one longitude on different parallels, and the steps between longitudes.
+constexpr double kSameX = 1e-10;
+
+// Which of a geographic CRS's two axes counts longitude, and what a full circle is on it.
+struct LongitudeAxis {
+  int index = 0;
+  double circle = 360;
+};
+
+std::optional<LongitudeAxis> longitude_axis(PJ_CONTEXT* context, PJ* geographic) {
+  const Object system(proj_crs_get_coordinate_system(context, geographic));
+  if (!system) return std::nullopt;
+  for (int axis = 0; axis < 2; ++axis) {
+    const char* direction = nullptr;
+    double radians = 0;
+    if (proj_cs_get_axis_info(context, system.get(), axis, nullptr, nullptr, &direction, &radians,
+                              nullptr, nullptr, nullptr) == 0) {
+      return std::nullopt;
+    }
+    if (direction != nullptr && std::string(direction) == "east" && radians > 0) {
+      return LongitudeAxis{.index = axis, .circle = 2 * std::numbers::pi / radians};
+    }
+  }
+  return std::nullopt;
+}
+
 // Degrees east of west to east; narrower than the list may suggest when it crosses the
 // antimeridian.
 struct Area {
@@ -30,6 +61,36 @@ struct Area {
   double east = 0;
   double north = 0;
 };
+
+// Equal steps from longitude to longitude, all within one turn: 0 where they are not equal.
+double turn_of_steps(const std::array<double, kLongitudes>& x) {
+  const auto [low, high] = std::minmax_element(x.begin(), x.end());
+  const double turn = (*high - *low) * kLongitudes / (kLongitudes - 1);
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const double step = std::abs(x[(k + 1) % x.size()] - x[k]);
+    const double at_seam = turn - step;
+    if (std::abs(std::min(step, at_seam) - turn / kLongitudes) > kSameX * turn) return 0;
+  }
+  return turn;
+}
+
+// PROJ's depend on the processor. What is left is micrometres of the Earth's equator.
+double without_last_bits(double length) {
+  int exponent = 0;
+  constexpr int kBits = 44;
+  const double fraction = std::frexp(length, &exponent);
+  return std::ldexp(std::round(std::ldexp(fraction, kBits)), exponent - kBits);
+}
+
+// x is that of the first parallel's, and y the same for all longitudes.
+bool goes_round(const std::array<MapPoint, kLongitudes>& row,
+                const std::array<double, kLongitudes>& first_x, double turn) {
+  for (std::size_t k = 0; k < row.size(); ++k) {
+    if (std::abs(row[k].x - first_x[k]) > kSameX * turn) return false;
+    if (std::abs(row[k].y - row[0].y) > kSameX * turn) return false;
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -110,6 +171,8 @@ std::optional<Area> CrsTransform::Impl::area_of(std::span<const MapPoint> extent
     area->south = std::min(area->south, at->latitude_deg);
     area->north = std::max(area->north, at->latitude_deg);
   }
+  // PROJ never comes back from an area without width.
+  if (area && !(area->west < area->east && area->south < area->north)) return std::nullopt;
   return area;
 }
 
@@ -140,6 +203,44 @@ std::unique_ptr<CrsTransform> CrsTransform::make(const CrsText& crs,
   const char* name = proj_get_name(impl->operation.get());
   impl->name = name != nullptr ? name : "";
   return std::unique_ptr<CrsTransform>(new CrsTransform(std::move(impl)));
+}
+
+// Through the CRS's own longitudes and latitudes: on another datum's, x would be a little off.
+double CrsTransform::turn_along_x(const CrsText& crs) {
+  Impl impl;
+  impl.axes = crs.axes;
+  impl.context.reset(proj_context_create());
+  PJ_CONTEXT* const context = impl.context.get();
+  proj_log_level(context, PJ_LOG_NONE);
+  const Object plane(proj_create(context, crs.wkt.c_str()));
+  if (!plane) return 0;
+  const Object geographic(proj_crs_get_geodetic_crs(context, plane.get()));
+  if (!geographic) return 0;
+  const std::optional<LongitudeAxis> axis = longitude_axis(context, geographic.get());
+  const Object operation(
+      proj_create_crs_to_crs_from_pj(context, geographic.get(), plane.get(), nullptr, nullptr));
+  if (!axis || !operation) return 0;
+  std::array<double, kLongitudes> first_x{};
+  double turn = 0;
+  for (const double parallel : kParallelsOfTurn) {
+    std::array<MapPoint, kLongitudes> row{};
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      PJ_COORD at = proj_coord(0, 0, 0, 0);
+      at.v[axis->index] =
+          axis->circle * ((static_cast<double>(k) + kFirstStep) / kLongitudes - 0.5);
+      at.v[1 - axis->index] = axis->circle * parallel;
+      const PJ_COORD c = proj_trans(operation.get(), PJ_FWD, at);
+      if (!is_finite(c)) return 0;
+      row[k] = impl.from_crs_axes(c);
+    }
+    if (turn == 0) {
+      std::transform(row.begin(), row.end(), first_x.begin(),
+                     [](const MapPoint& p) { return p.x; });
+      turn = turn_of_steps(first_x);
+    }
+    if (!(turn > 0) || !goes_round(row, first_x, turn)) return 0;
+  }
+  return without_last_bits(turn);
 }
 
 std::optional<MapPoint> CrsTransform::forward(const LonLat& point) const {

@@ -36,6 +36,10 @@ class CrsTransform {
   // `extent` are points of the raster's extent. None where PROJ knows no way that reaches a single
   // one of them from the globe (a local CRS, a wrong CRS).
   static std::unique_ptr<CrsTransform> make(const CrsText& crs, std::span<const MapPoint> extent);
+  // How far once round the globe is along x, in the CRS's unit, where a place's x depends on its
+  // longitude alone and evenly so (Mercator, equirectangular and other cylindrical projections, not
+  // transverse ones): places at x and x plus a turn are then the same. 0 for all other projected CRSs.
+  static double turn_along_x(const CrsText& crs);
   ~CrsTransform();
   CrsTransform(const CrsTransform&) = delete;
   CrsTransform& operator=(const CrsTransform&) = delete;

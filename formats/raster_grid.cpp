@@ -24,6 +24,8 @@ constexpr double kSnapsPerPixel = 1024;
 // for the tiling would lie one and all, each to be decided by its last bit.
 constexpr double kSnapFrom = 0.4871;
 constexpr double kSnapsPerDegree = 1e9;
+// Some centimetres of the equator.
+constexpr double kSameTurn = 1e-9;
 // A micrometre, as kSamePlaceDeg: an edge at a whole degree is not the next number's for its last
 // bit.
 constexpr double kSameSnap = 0.01;
@@ -51,6 +53,23 @@ bool leaves_degrees_alone(const CrsTransform& transform, std::span<const MapPoin
   });
 }
 
+// x of a longitude on some parallels, but for what a datum makes: cheap beside turn_along_x().
+bool may_go_round(const CrsTransform& transform) {
+  constexpr double kSamePart = 1e-3;
+  for (const double longitude_deg : {-100.3, 20.7, 140.1}) {
+    const std::optional<MapPoint> middle =
+        transform.forward({.longitude_deg = longitude_deg, .latitude_deg = 0});
+    if (!middle) return false;
+    for (const double latitude_deg : {-50.0, 50.0}) {
+      const std::optional<MapPoint> there =
+          transform.forward({.longitude_deg = longitude_deg, .latitude_deg = latitude_deg});
+      const double size = std::abs(middle->x) + (there ? std::abs(there->y) : 0);
+      if (!there || !(std::abs(there->x - middle->x) <= kSamePart * size)) return false;
+    }
+  }
+  return true;
+}
+
 PixelPoint snapped(const PixelPoint& p) {
   return {.column = std::floor(p.column * kSnapsPerPixel + kSnapFrom) / kSnapsPerPixel,
           .row = std::floor(p.row * kSnapsPerPixel + kSnapFrom) / kSnapsPerPixel};
@@ -66,12 +85,6 @@ RectangleDeg widened(const RectangleDeg& bounds) {
           .south_deg = down(bounds.south_deg),
           .east_deg = up(bounds.east_deg),
           .north_deg = up(bounds.north_deg)};
-}
-
-// 0 where there is no turn.
-double turn_pixels(const GridInfo& info) {
-  if (!info.plane.is_axis_aligned()) return 0;
-  return info.placement->turn / std::abs(info.plane.x_per_column);
 }
 
 }  // namespace
@@ -92,9 +105,14 @@ double PixelPlane::smaller_extent() const {
   return std::min(area / length(y_per_column, y_per_row), area / length(x_per_column, x_per_row));
 }
 
-std::int64_t columns_of_a_turn(const GridInfo& info) {
+double columns_round_globe(const GridInfo& info) {
   QMPIPE_CHECK(info.placement != nullptr);
-  const double pixels = turn_pixels(info);
+  if (!info.plane.is_axis_aligned()) return 0;
+  return info.placement->turn / std::abs(info.plane.x_per_column);
+}
+
+std::int64_t columns_of_a_turn(const GridInfo& info) {
+  const double pixels = columns_round_globe(info);
   // A whole number of more pixels than a double counts by hundredths is nobody's.
   if (!(pixels > 0.5) || pixels > 1e12) return 0;
   const double whole = std::round(pixels);
@@ -131,7 +149,11 @@ std::optional<RasterGrid> RasterGrid::place(const GridInfo& shape, const RasterC
   RasterPlacement placement{
       .crs = crs, .transformation = transform->name(), .is_ballpark = transform->is_ballpark()};
   placement.is_identity = crs.is_geographic && leaves_degrees_alone(*transform, points);
-  placement.turn = crs.is_geographic ? crs.turn : 0;
+  if (crs.is_geographic) {
+    placement.turn = crs.turn;
+  } else if (may_go_round(*transform)) {
+    placement.turn = CrsTransform::turn_along_x(crs.text);
+  }
   GridInfo info = shape;
   info.is_separable = placement.is_identity && info.plane.is_axis_aligned();
   info.placement = std::make_shared<const RasterPlacement>(std::move(placement));
@@ -148,7 +170,11 @@ std::optional<PixelPoint> RasterGrid::pixel_at(double longitude_deg, double lati
     if (!projected) return std::nullopt;
     map = *projected;
   }
-  if (turn_ > 0) map.x -= turn_ * std::floor((map.x - middle_x_ + turn_ / 2) / turn_);
+  if (turn_ > 0) {
+    // Where half a turn is reached must not be decided by PROJ's last bit.
+    const double slack = transform_ ? kSameTurn : 0;
+    map.x -= turn_ * std::floor((map.x - middle_x_ + turn_ / 2) / turn_ + slack);
+  }
   const PixelPoint pixel = info_.plane.pixel_of(map);
   return transform_ ? snapped(pixel) : pixel;
 }

@@ -113,8 +113,12 @@ class RasterGrid {
   double middle_x_ = 0;
 };
 
-// How many columns make a turn round the globe, a whole number to a hundredth of a pixel; 0 where
-// the grid's columns do not go round it or do not close. REQUIRES: a placement.
+// How many columns make a turn round the globe, whole or not; 0 where the grid's columns do not go
+// round it. REQUIRES: a placement.
+double columns_round_globe(const GridInfo& info);
+
+// The same where it is a whole number to a hundredth of a pixel, so that columns a turn apart are one;
+// else 0.
 std::int64_t columns_of_a_turn(const GridInfo& info);
 
 }  // namespace qmpipe

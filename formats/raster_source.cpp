@@ -16,6 +16,7 @@
 #include "formats/raster_dataset.h"
 #include "formats/raster_placement.h"
 #include "formats/raster_reader.h"
+#include "formats/unplaced_pixels.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
@@ -73,6 +74,9 @@ struct RasterSource::Impl {
   void take_heights(const RasterCrs& crs);
   void place_in_plane(const RasterCrs& crs);
   void place_on_globe(const RasterCrs& crs);
+  void note_unplaced();
+  // `is_watched`: what is read counts as shown to the tally.
+  void read(const PixelWindow& window, std::span<double> out, bool is_watched);
 };
 
 void RasterSource::Impl::describe(const std::string& path) {
@@ -143,6 +147,38 @@ void RasterSource::Impl::place_on_globe(const RasterCrs& crs) {
   }
 }
 
+// Whole maps of the globe have corners beyond it, most often void: heights there are worth a word.
+void RasterSource::Impl::note_unplaced() {
+  const UnplacedPixels unplaced = unplaced_pixels(*grid);
+  std::int64_t heights = 0;
+  PixelIndex first;
+  for (const PixelIndex& pixel : unplaced.pixels) {
+    std::array<double, 1> height = {std::numeric_limits<double>::quiet_NaN()};
+    read({.column0 = pixel.column, .row0 = pixel.row, .width = 1, .height = 1}, height, false);
+    if (std::isnan(height[0])) continue;
+    if (heights++ == 0) first = pixel;
+  }
+  if (heights == 0) return;
+  info.assumptions.push_back(fmt::format(
+      "about {:.0f} % of its pixels have heights that lie nowhere on the globe (one is in "
+      "column {}, row {}): the CRS '{}' does not reach there; they are left out",
+      std::ceil(100 * static_cast<double>(heights) / static_cast<double>(unplaced.looked_at)),
+      first.column, first.row, info.crs_name));
+}
+
+void RasterSource::Impl::read(const PixelWindow& window, std::span<double> out, bool is_watched) {
+  mask.resize(rule.has_mask ? out.size() : 0);
+  reader->read(window, out, mask);
+  for (std::size_t k = 0; k < mask.size(); ++k) {
+    if (mask[k] == 0) out[k] = std::numeric_limits<double>::quiet_NaN();
+  }
+  if (is_watched && watches_reads && watch->wants(reads)) {
+    watch->see(out);
+    watch->done(reads++, *reader);
+  }
+  rule.apply(out);
+}
+
 RasterSource::RasterSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RasterSource::~RasterSource() = default;
 const RasterInfo& RasterSource::info() const { return impl_->info; }
@@ -175,6 +211,7 @@ std::unique_ptr<RasterSource> RasterSource::open(const std::string& path,
   impl->reader.emplace(*impl->band, impl->rule.has_mask, impl->info, options.cache, options.number,
                        impl->watch ? &*impl->watch : nullptr);
   impl->watches_reads = impl->watch && !options.cache;
+  if (impl->grid) impl->note_unplaced();
   return std::unique_ptr<RasterSource>(new RasterSource(std::move(impl)));
 }
 
@@ -188,16 +225,7 @@ void RasterSource::read(const PixelWindow& window, std::span<double> out) const 
   QMPIPE_CHECK(window.width > 0 && window.height > 0 && out.size() == window.size());
   QMPIPE_CHECK(window.column0 >= 0 && window.column0 + window.width <= impl.info.width);
   QMPIPE_CHECK(window.row0 >= 0 && window.row0 + window.height <= impl.info.height);
-  impl.mask.resize(impl.rule.has_mask ? out.size() : 0);
-  impl.reader->read(window, out, impl.mask);
-  for (std::size_t k = 0; k < impl.mask.size(); ++k) {
-    if (impl.mask[k] == 0) out[k] = std::numeric_limits<double>::quiet_NaN();
-  }
-  if (impl.watches_reads && impl.watch->wants(impl.reads)) {
-    impl.watch->see(out);
-    impl.watch->done(impl.reads++, *impl.reader);
-  }
-  impl.rule.apply(out);
+  impl.read(window, out, true);
 }
 
 void set_gdal_cache_bytes(std::int64_t bytes) { GDALSetCacheMax64(bytes); }

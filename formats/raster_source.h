@@ -47,6 +47,11 @@ struct RasterInfo : GridInfo {
   // How longitude and latitude become the raster's CRS, in PROJ's words; where it is placed on the
   // globe.
   std::string transformation;
+  // Of rasters that lie on one grid: that grid, and where this one's first pixel is on it
+  // (joined_grids.h). None: it is alone on its own.
+  std::shared_ptr<const GridInfo> whole;
+  std::int64_t whole_column = 0;
+  std::int64_t whole_row = 0;
   // What the file leaves open and was assumed, as sentences without a full stop ("the file names no
   // CRS; ..."); the program tells the user.
   std::vector<std::string> assumptions;

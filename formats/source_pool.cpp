@@ -25,6 +25,18 @@ bool is_the_same(const RasterInfo& a, const RasterInfo& b) {
          a.block_height == b.block_height && a.type_name == b.type_name && a.plane == b.plane;
 }
 
+// What is asked for, or the place that it may take: one of those that are free, else that of what was
+// asked for longest ago.
+template <class Kept, class IsWanted>
+Kept& place_for(std::vector<Kept>& kept, std::size_t most, const IsWanted& is_wanted) {
+  const auto found = std::find_if(kept.begin(), kept.end(), is_wanted);
+  if (found != kept.end()) return *found;
+  if (kept.size() < most) return kept.emplace_back();
+  return *std::min_element(kept.begin(), kept.end(), [](const Kept& a, const Kept& b) {
+    return a.last_asked < b.last_asked;
+  });
+}
+
 }  // namespace
 
 SourcePool::SourcePool(std::shared_ptr<const std::vector<RasterInfo>> infos, OpenOptions options,
@@ -47,36 +59,35 @@ std::unique_ptr<RasterSource> SourcePool::open(std::size_t number) const {
   return source;
 }
 
-SourcePool::Opened& SourcePool::opened(std::size_t number) {
+const RasterSource& SourcePool::source(std::size_t number) {
   QMPIPE_CHECK(number < size());
-  ++asked_;
-  auto found = std::find_if(opened_.begin(), opened_.end(),
-                            [number](const Opened& one) { return one.number == number; });
-  if (found == opened_.end()) {
-    if (opened_.size() < most_open_) {
-      found = opened_.emplace(opened_.end());
-    } else {
-      found = std::min_element(
-          opened_.begin(), opened_.end(),
-          [](const Opened& a, const Opened& b) { return a.last_asked < b.last_asked; });
-      // Before the other is opened, which could be one file too many.
-      found->source.reset();
-      found->grid.reset();
-    }
-    // Of no raster, until the one is open.
-    found->number = size();
-    found->source = open(number);
-    found->number = number;
+  Opened& one = place_for(opened_, most_open_,
+                          [number](const Opened& opened) { return opened.number == number; });
+  if (!one.source || one.number != number) {
+    // Before the other is opened, which could be one file too many.
+    one.source.reset();
+    one.source = open(number);
+    one.number = number;
   }
-  found->last_asked = asked_;
-  return *found;
+  one.last_asked = ++asked_;
+  return *one.source;
 }
 
-const RasterSource& SourcePool::source(std::size_t number) { return *opened(number).source; }
+const GridInfo& SourcePool::grid_info(std::size_t number) const {
+  const RasterInfo& raster = info(number);
+  return raster.whole ? *raster.whole : raster;
+}
 
 const RasterGrid& SourcePool::grid(std::size_t number) {
-  Opened& one = opened(number);
-  if (!one.grid) one.grid.emplace(info(number));
+  const GridInfo& info = grid_info(number);
+  Placed& one = place_for(placed_, most_open_,
+                          [&info](const Placed& placed) { return placed.info == &info; });
+  if (one.info != &info) {
+    one.info = nullptr;
+    one.grid = std::make_unique<RasterGrid>(info);
+    one.info = &info;
+  }
+  one.last_asked = ++asked_;
   return *one.grid;
 }
 

@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "formats/raster_source.h"
@@ -27,7 +26,9 @@ class SourcePool {
   // Stays open until so many others as may be open were asked for. Throws IoError as
   // RasterSource::open() does, and when the raster is not the one that the info tells of.
   const RasterSource& source(std::size_t number);
-  // Where its pixels lie on the globe; the same holds.
+  // The grid that it lies on, alone or with others. Stays until so many other grids as rasters may be
+  // open were asked for.
+  const GridInfo& grid_info(std::size_t number) const;
   const RasterGrid& grid(std::size_t number);
 
  private:
@@ -35,15 +36,19 @@ class SourcePool {
     std::size_t number = 0;
     std::int64_t last_asked = 0;
     std::unique_ptr<RasterSource> source;
-    std::optional<RasterGrid> grid;
   };
-  Opened& opened(std::size_t number);
+  struct Placed {
+    const GridInfo* info = nullptr;
+    std::int64_t last_asked = 0;
+    std::unique_ptr<RasterGrid> grid;
+  };
   std::unique_ptr<RasterSource> open(std::size_t number) const;
 
   std::shared_ptr<const std::vector<RasterInfo>> infos_;
   OpenOptions options_;
   std::size_t most_open_;
   std::vector<Opened> opened_;
+  std::vector<Placed> placed_;
   std::int64_t asked_ = 0;
 };
 

@@ -74,6 +74,33 @@ void note_sampling(const SurveyOptions& survey, const std::vector<RasterInfo>& s
       survey.max_zoom, zoom, posts, bytes_text(posts * static_cast<std::int64_t>(sizeof(float)))));
 }
 
+void note_grids(const std::vector<RasterInfo>& sources, Progress& progress) {
+  std::set<const GridInfo*> grids;
+  std::size_t joined = 0;
+  for (const RasterInfo& source : sources) {
+    if (!source.whole) continue;
+    grids.insert(source.whole.get());
+    ++joined;
+  }
+  if (joined == 0) return;
+  progress.note(fmt::format(
+      "{} of {} inputs lie on {}: read as one raster, without a seam", joined, sources.size(),
+      grids.size() == 1 ? "one grid" : fmt::format("{} grids", grids.size())));
+}
+
+// Reducing is what makes coarse posts right, so a smaller --max-zoom does not spare it.
+void note_sampling(const SurveyOptions& survey, const std::vector<RasterInfo>& sources,
+                   Progress& progress) {
+  const std::int32_t zoom = chosen_sampling_zoom(survey, sources);
+  if (survey.max_zoom < 0 || survey.max_zoom >= zoom) return;
+  const std::int64_t posts =
+      expected_blocks(survey.scheme, zoom, sources) * (std::int64_t{kBlockPosts} * kBlockPosts);
+  progress.note(fmt::format(
+      "tiles end at zoom {}, but posts are taken at zoom {}, where they are no wider apart than "
+      "the pixels, and reduced: at most {} posts, {} while the run lasts",
+      survey.max_zoom, zoom, posts, bytes_text(posts * static_cast<std::int64_t>(sizeof(float)))));
+}
+
 void require_data(const Survey& survey) {
   if (!survey.tiles.front().empty()) return;
   std::string names;
@@ -311,6 +338,7 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   }
   require_a_zoom(options, options.mesh.max_zoom.value_or(chosen_sampling_zoom(to_survey, sources)));
   note_sources(sources, progress);
+  note_grids(sources, progress);
   note_sampling(to_survey, sources, progress);
   // Refuses what cannot work before anything is made on disk.
   share_memory(memory_request(options), to_survey, sources);

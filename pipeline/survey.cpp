@@ -18,6 +18,7 @@
 
 #include "formats/errors.h"
 #include "formats/hdf5_lattice_store.h"
+#include "formats/joined_grids.h"
 #include "formats/lattice_window.h"
 #include "formats/source_block_cache.h"
 #include "formats/tiered_lattice_store.h"
@@ -338,6 +339,7 @@ std::vector<RasterInfo> describe_inputs(const SurveyOptions& options) {
     }
   });
   if (first_wrong < infos.size()) std::rethrow_exception(errors[first_wrong]);
+  join_grids(infos);
   return infos;
 }
 

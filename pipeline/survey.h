@@ -71,7 +71,7 @@ struct Survey {
 std::int32_t chosen_sampling_zoom(const SurveyOptions& options,
                                   const std::vector<RasterInfo>& sources);
 
-// Opens the inputs to learn about them: throws IoError for one that cannot be used, UsageError when
+// Opens the inputs to learn about them, and which of them lie on one grid: throws IoError for one that cannot be used, UsageError when
 // there is none.
 std::vector<RasterInfo> describe_inputs(const SurveyOptions& options);
 

@@ -16,6 +16,7 @@
 #include "pipeline/recipe.h"
 #include "pipeline/verify_borders.h"
 #include "pipeline/verify_outside.h"
+#include "pipeline/verify_pixels.h"
 #include "pipeline/verify_set.h"
 #include "pipeline/verify_source.h"
 #include "pipeline/verify_tile.h"
@@ -71,7 +72,7 @@ class Verification {
  private:
   void read_recipe();
   void open_source();
-  void look_for_expected_tiles(const std::vector<TileKey>& keys);
+  void look_for_missing_tiles(const std::vector<TileKey>& keys);
   void verify_zoom(std::span<const TileKey> keys);
   TileOutcome examine(const TileKey& key) const;
   void measure(const QuantizedMesh& mesh, TileOutcome& outcome) const;
@@ -133,14 +134,16 @@ void Verification::open_source() {
                               layer_.scheme, recipe_, progress_);
 }
 
-void Verification::look_for_expected_tiles(const std::vector<TileKey>& keys) {
-  if (!source_) return;
-  for (const TileKey& key : source_->expected_tiles()) {
+void Verification::look_for_missing_tiles(const std::vector<TileKey>& keys) {
+  if (!source_ || !recipe_) return;
+  const std::vector<TileKey> expected = source_->expected_tiles();
+  for (const TileKey& key : expected) {
     if (std::binary_search(keys.begin(), keys.end(), key)) continue;
     log_.add({.kind = FindingKind::kMissingTile,
               .key = key,
               .text = "the source has data here, but the set has no tile"});
   }
+  log_.add_all(check_pixels(source_->sources(), *recipe_, keys, expected));
 }
 
 VerifyReport Verification::run() {
@@ -151,7 +154,7 @@ VerifyReport Verification::run() {
   log_.add_all(std::move(tiles.findings));
   log_.add_all(check_listing(layer_, tiles.keys, tile_set_.strays()));
   open_source();
-  look_for_expected_tiles(tiles.keys);
+  look_for_missing_tiles(tiles.keys);
   {
     const Phase phase(progress_, "verify", "tiles", static_cast<std::int64_t>(tiles.keys.size()));
     const std::span<const TileKey> keys = tiles.keys;

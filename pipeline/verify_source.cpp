@@ -66,6 +66,7 @@ class SurveyedPosts final : public SourcePosts {
     }
     return keys;
   }
+  const std::vector<RasterInfo>& sources() const override { return survey_.sources; }
 
  private:
   std::unique_ptr<ScratchFolder> scratch_;
@@ -98,6 +99,7 @@ class SampledPosts final : public SourcePosts {
   std::optional<double> tolerance_m(std::int32_t) const override { return std::nullopt; }
   double relief_near_m(const TileKey& /*key*/) const override { return 0; }
   std::vector<TileKey> expected_tiles() const override { return {}; }
+  const std::vector<RasterInfo>& sources() const override { return *sources_; }
 
  private:
   std::unique_ptr<Sampler> open_sampler(const SourceOptions& options) const {

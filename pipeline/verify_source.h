@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/raster_source.h"
 #include "pipeline/progress.h"
 #include "pipeline/recipe.h"
 #include "scheduler/tiling_scheme.h"
@@ -31,6 +32,8 @@ class SourcePosts {
   virtual double relief_near_m(const TileKey& key) const = 0;
   // Tiles that the recipe asks for and the source has data for, sorted; empty without a recipe.
   virtual std::vector<TileKey> expected_tiles() const = 0;
+  // What the inputs are, in order of priority.
+  virtual const std::vector<RasterInfo>& sources() const = 0;
 };
 
 struct SourceOptions {

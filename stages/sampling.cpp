@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "formats/grid_pixels.h"
 #include "scheduler/check.h"
 #include "stages/post_positions.h"
 
@@ -40,12 +41,16 @@ struct Strip {
   }
 };
 
-// A raster in hand. One that a pool has opened to be read does not know its own place on the globe,
-// nor whether it goes round it: its grid does.
-struct GridPixels {
-  const GridInfo& grid;
-  const RasterSource& source;
+// Rasters of one grid that follow each other in the order of priority: they are sampled at once.
+struct Run {
+  std::size_t first = 0;
+  std::size_t last = 0;
+  std::size_t grid = 0;
 };
+
+RasterShape shape_of(const GridInfo& grid) {
+  return {.width = grid.width, .height = grid.height, .wraps_columns = grid.wraps_columns};
+}
 
 bool is_full(const Strip& block) {
   const auto width = static_cast<std::size_t>(block.posts.width_posts);
@@ -60,48 +65,56 @@ bool is_full(const Strip& block) {
 }  // namespace
 
 struct Sampler::Impl {
-  explicit Impl(SourcePool pool, Resampling method)
-      : sources(std::move(pool)), resampling(method) {}
+  explicit Impl(SourcePool pool, Resampling method);
 
   SourcePool sources;
+  GridPixels grids;
+  std::vector<Run> runs;
   Resampling resampling;
   // Buffers kept between calls.
   std::vector<PixelPoint> places;
   std::vector<double> pixels;
-  std::vector<double> read_buffer;
   // By zoom and row. A value is a pure function of both.
   std::map<std::pair<std::int32_t, std::int64_t>, float> pole_heights_m;
 
+  bool touches(const Run& run, const Lattice& lattice, const PostRange& range) const;
   void sample_strip(const Lattice& lattice, const Strip& strip);
-  void sample_block(std::size_t number, const Lattice& lattice, const Strip& block);
-  void sample_part(const GridPixels& raster, const Strip& block, const Part& part);
-  void fetch(const GridPixels& raster, const PixelWindow& needed);
-  void read_piece(const RasterSource& source, const PixelWindow& piece, double* out,
-                  std::int64_t stride);
+  void sample_block(const Run& run, const Lattice& lattice, const Strip& block);
+  void sample_copies(const Run& run, const Strip& block);
+  void sample_part(const Run& run, const Strip& block, const Part& part);
+  void leave_out_known(const Strip& block);
+  void leave_out_later(const Run& run, const Strip& block, const Part& part,
+                       const NeededPixels& needed);
+  void fetch(const Run& run, std::size_t last_raster, const PixelWindow& needed);
+  std::span<PixelPoint> places_of(const Strip& block, const Part& part, std::size_t row);
   float pole_height_m(const Lattice& lattice, std::int64_t j);
 };
 
-void Sampler::Impl::read_piece(const RasterSource& source, const PixelWindow& piece, double* out,
-                               std::int64_t stride) {
-  if (piece.width == stride) {
-    source.read(piece, {out, piece.size()});
-    return;
-  }
-  read_buffer.resize(piece.size());
-  source.read(piece, read_buffer);
-  for (std::int64_t r = 0; r < piece.height; ++r) {
-    std::copy_n(read_buffer.data() + r * piece.width, piece.width, out + r * stride);
+Sampler::Impl::Impl(SourcePool pool, Resampling method)
+    : sources(std::move(pool)), grids(sources), resampling(method) {
+  for (std::size_t k = 0; k < sources.size(); ++k) {
+    const std::size_t grid = grids.grid_of(k);
+    if (runs.empty() || runs.back().grid != grid) runs.push_back({.first = k, .grid = grid});
+    runs.back().last = k;
   }
 }
 
-// The needed window as if the raster went on beyond its edges.
-void Sampler::Impl::fetch(const GridPixels& raster, const PixelWindow& needed) {
-  const GridInfo& info = raster.grid;
+bool Sampler::Impl::touches(const Run& run, const Lattice& lattice, const PostRange& range) const {
+  for (std::size_t k = run.first; k <= run.last; ++k) {
+    if (touches_bounds(sources.info(k), lattice, range)) return true;
+  }
+  return false;
+}
+
+// The needed window as if the grid went on beyond its edges.
+void Sampler::Impl::fetch(const Run& run, std::size_t last_raster, const PixelWindow& needed) {
+  const GridInfo& info = sources.grid_info(run.first);
   pixels.resize(needed.size());
   const std::int64_t row0 = std::clamp<std::int64_t>(needed.row0, 0, info.height - 1);
   const std::int64_t row1 =
       std::clamp<std::int64_t>(needed.row0 + needed.height - 1, 0, info.height - 1);
-  double* const first = pixels.data() + (row0 - needed.row0) * needed.width;
+  const std::span<double> first_row =
+      std::span(pixels).subspan(static_cast<std::size_t>((row0 - needed.row0) * needed.width));
   std::int64_t done = 0;
   while (done < needed.width) {
     const std::int64_t wanted = needed.column0 + done;
@@ -112,10 +125,11 @@ void Sampler::Impl::fetch(const GridPixels& raster, const PixelWindow& needed) {
       piece.width = std::min(left, info.width - piece.column0);
     } else {
       piece.column0 = std::clamp<std::int64_t>(wanted, 0, info.width - 1);
-      // Outside the raster: its outermost pixel, one column at a time.
+      // Outside the grid: its outermost pixel, one column at a time.
       piece.width = wanted == piece.column0 ? std::min(left, info.width - wanted) : 1;
     }
-    read_piece(raster.source, piece, first + done, needed.width);
+    grids.read(sources, run.grid, last_raster, piece,
+               first_row.subspan(static_cast<std::size_t>(done)), needed.width);
     done += piece.width;
   }
   const auto row_at = [&](std::int64_t row) {
@@ -129,17 +143,33 @@ void Sampler::Impl::fetch(const GridPixels& raster, const PixelWindow& needed) {
   }
 }
 
-void Sampler::Impl::sample_part(const GridPixels& raster, const Strip& block, const Part& part) {
-  const GridInfo& info = raster.grid;
-  const RasterShape shape{
-      .width = info.width, .height = info.height, .wraps_columns = info.wraps_columns};
-  const auto places_of_row = [&](std::size_t r) {
-    const auto width = static_cast<std::size_t>(block.posts.width_posts);
-    return std::span<const PixelPoint>(places).subspan((part.row + r) * width + part.column,
-                                                       part.width);
-  };
+std::span<PixelPoint> Sampler::Impl::places_of(const Strip& block, const Part& part,
+                                               std::size_t row) {
+  const auto width = static_cast<std::size_t>(block.posts.width_posts);
+  return std::span(places).subspan((part.row + row) * width + part.column, part.width);
+}
+
+// A raster of another grid comes between those of this one: what stands on a pixel that only a later
+// one has is not for this run. Between pixels that it has, the later ones count as neighbours.
+void Sampler::Impl::leave_out_later(const Run& run, const Strip& block, const Part& part,
+                                    const NeededPixels& needed) {
+  fetch(run, run.last, needed.window);
+  const RasterShape shape = shape_of(sources.grid_info(run.first));
+  std::vector<float> nearest(part.width);
+  for (std::size_t r = 0; r < part.height; ++r) {
+    const std::span<PixelPoint> row = places_of(block, part, r);
+    std::fill(nearest.begin(), nearest.end(), kVoid);
+    resample(Resampling::kNearest, shape, {.needed = needed, .heights_m = pixels}, row, nearest);
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      if (std::isnan(nearest[k])) row[k].column = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+}
+
+void Sampler::Impl::sample_part(const Run& run, const Strip& block, const Part& part) {
+  const RasterShape shape = shape_of(sources.grid_info(run.first));
   PlaceBounds bounds(shape);
-  for (std::size_t r = 0; r < part.height; ++r) bounds.add(places_of_row(r));
+  for (std::size_t r = 0; r < part.height; ++r) bounds.add(places_of(block, part, r));
   const std::optional<NeededPixels> needed = bounds.needed(resampling);
   if (!needed) return;
   const bool is_single = part.width == 1 && part.height == 1;
@@ -155,32 +185,60 @@ void Sampler::Impl::sample_part(const GridPixels& raster, const Strip& block, co
       second.row += first.height;
       second.height -= first.height;
     }
-    sample_part(raster, block, first);
-    sample_part(raster, block, second);
+    sample_part(run, block, first);
+    sample_part(run, block, second);
     return;
   }
-  fetch(raster, needed->window);
+  if (run.last < grids.last_raster(run.grid)) leave_out_later(run, block, part, *needed);
+  fetch(run, grids.last_raster(run.grid), needed->window);
   for (std::size_t r = 0; r < part.height; ++r) {
-    resample(resampling, shape, {.needed = *needed, .heights_m = pixels}, places_of_row(r),
+    resample(resampling, shape, {.needed = *needed, .heights_m = pixels}, places_of(block, part, r),
              block.row(part.row + r, part.column, part.width));
   }
 }
 
-void Sampler::Impl::sample_block(std::size_t number, const Lattice& lattice, const Strip& block) {
+// Posts that have a height already.
+void Sampler::Impl::leave_out_known(const Strip& block) {
   const auto width = static_cast<std::size_t>(block.posts.width_posts);
   const auto height = static_cast<std::size_t>(block.posts.height_posts);
-  places.resize(block.posts.size());
-  locate_posts(sources.grid(number), lattice, block.posts, places);
   for (std::size_t r = 0; r < height; ++r) {
     const std::span<const float> row = block.row(r, 0, width);
     for (std::size_t k = 0; k < width; ++k) {
-      // An earlier source has this post already.
       if (!std::isnan(row[k]))
         places[r * width + k].column = std::numeric_limits<double>::quiet_NaN();
     }
   }
-  sample_part({.grid = sources.info(number), .source = sources.source(number)}, block,
-              {.width = width, .height = height});
+}
+
+// A raster that goes round the globe more than once has a place twice: what is void in its middle may
+// be valid a turn beside it.
+void Sampler::Impl::sample_copies(const Run& run, const Strip& block) {
+  const GridInfo& info = sources.grid_info(run.first);
+  const double turn = columns_round_globe(info);
+  const double width = static_cast<double>(info.width);
+  if (!(turn > 0)) return;
+  double side = 1;
+  for (double turns = 1; turns * turn + 0.5 < width; ++turns) {
+    for (const double steps : {2 * turns - 1, 2 * turns}) {
+      if (is_full(block)) return;
+      leave_out_known(block);
+      for (PixelPoint& place : places) place.column += side * steps * turn;
+      side = -side;
+      sample_part(run, block,
+                  {.width = static_cast<std::size_t>(block.posts.width_posts),
+                   .height = static_cast<std::size_t>(block.posts.height_posts)});
+    }
+  }
+}
+
+void Sampler::Impl::sample_block(const Run& run, const Lattice& lattice, const Strip& block) {
+  places.resize(block.posts.size());
+  locate_posts(sources.grid(run.first), lattice, block.posts, places);
+  leave_out_known(block);
+  sample_part(run, block,
+              {.width = static_cast<std::size_t>(block.posts.width_posts),
+               .height = static_cast<std::size_t>(block.posts.height_posts)});
+  sample_copies(run, block);
 }
 
 void Sampler::Impl::sample_strip(const Lattice& lattice, const Strip& strip) {
@@ -198,10 +256,10 @@ void Sampler::Impl::sample_strip(const Lattice& lattice, const Strip& strip) {
                             .j0 = posts.j0,
                             .i1 = posts.i0 + posts.width_posts - 1,
                             .j1 = posts.j0 + posts.height_posts - 1};
-      for (std::size_t k = 0; k < sources.size(); ++k) {
-        if (!touches_bounds(sources.info(k), lattice, range)) continue;
+      for (const Run& run : runs) {
+        if (!touches(run, lattice, range)) continue;
         if (is_full(block)) break;
-        sample_block(k, lattice, block);
+        sample_block(run, lattice, block);
       }
     }
   }
@@ -273,10 +331,8 @@ bool Sampler::may_cover(const Lattice& lattice, const PostWindow& window) const 
                         .i1 = window.i0 + window.width_posts - 1,
                         .j1 = std::min(window.j0 + window.height_posts, lattice.rows()) - 1};
   if (range.j0 > range.j1) return false;
-  for (std::size_t k = 0; k < impl_->sources.size(); ++k) {
-    if (touches_bounds(impl_->sources.info(k), lattice, range)) return true;
-  }
-  return false;
+  return std::any_of(impl_->runs.begin(), impl_->runs.end(),
+                     [&](const Run& run) { return impl_->touches(run, lattice, range); });
 }
 
 std::int32_t sampling_zoom_for(const TilingScheme& scheme, std::span<const RasterInfo> sources) {

@@ -65,6 +65,18 @@ class ManySourcesTest(unittest.TestCase):
         self.build("all", "--threads", "1")
         self.build("few", "--threads", "2", limited=True)
         self.assertEqual(contents(self.root / "few"), contents(self.root / "all"))
+        # And these are the tiles of the raster that the files were cut from.
+        rows = FILES // ACROSS * SIDE
+        one = self.root / "one.asc"
+        # Part k is rows from the south up, its own rows from the north down.
+        one.write_text("\n".join(
+            [f"ncols {ACROSS * SIDE}", f"nrows {rows}", "xllcorner 6.0", "yllcorner 44.0",
+             f"cellsize {CELL_DEG!r}"] +
+            [" ".join(f"{height_m(c, rows - 1 - r):.2f}" for c in range(ACROSS * SIDE))
+             for r in range(rows)]) + "\n")
+        self.parts = [one]
+        self.build("one")
+        self.assertEqual(contents(self.root / "one"), contents(self.root / "all"))
         done = run("verify", self.root / "few", *IN_DEGREES, "--source", *self.parts, limited=True)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 

@@ -11,6 +11,8 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "formats/joined_grids.h"
+
 namespace qmpipe::testing {
 namespace {
 
@@ -130,6 +132,7 @@ std::vector<double> read_all(const RasterSource& source) {
 SourcePool pool_of(const std::vector<std::string>& paths) {
   std::vector<RasterInfo> infos;
   for (const std::string& path : paths) infos.push_back(RasterSource::open(path)->info());
+  join_grids(infos);
   return {std::make_shared<const std::vector<RasterInfo>>(std::move(infos)), {}, paths.size()};
 }
 

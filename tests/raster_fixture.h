@@ -52,7 +52,7 @@ void copy_raster(const std::string& from, const std::string& to, const std::stri
 
 std::unique_ptr<RasterSource> open_fixture(const std::string& path, const RasterFixture& fixture);
 std::vector<double> read_all(const RasterSource& source);
-// All may be open at once.
+// Those on one grid are joined; all may be open at once.
 SourcePool pool_of(const std::vector<std::string>& paths);
 
 // A real DEM, or nothing where the data is absent (QMPIPE_DATA, else ../shared/data).

@@ -280,6 +280,7 @@ TEST(RasterSource, EveryTruncationIsRefusedOrReadInFull) {
 TEST(RasterSource, TruncatedBlocksAreNamed) {
   const TemporaryFolder folder;
   RasterFixture fixture{.width = 256, .height = 256};
+  fixture.geotransform = {{10, 0.1, 0, 50, 0, -0.1}};
   const std::string path = file_in(folder, "a.tif");
   write_raster(path, fixture);
   std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
