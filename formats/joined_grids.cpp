@@ -259,7 +259,9 @@ void join(std::span<RasterInfo> rasters, const Cluster& cluster,
     first_row = std::min(first_row, member.row);
     end_row = std::max(end_row, member.row + rasters[member.raster].height);
   }
-  GridInfo shape{.width = columns.count, .height = end_row - first_row};
+  GridInfo shape;
+  shape.width = columns.count;
+  shape.height = end_row - first_row;
   shape.plane = plane_from(rasters, members, cluster, columns.first, first_row);
   const std::optional<RasterGrid> grid =
       RasterGrid::place(shape, rasters[members.front().raster].placement->crs);

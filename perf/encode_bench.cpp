@@ -20,7 +20,7 @@ namespace {
 // A tile at every step of its way.
 struct Steps {
   BenchTile tile;
-  HeightSteps height_steps;
+  HeightSteps height_steps = {};
   Tin inserted;
   Tin ordered;
   QuantizedMesh mesh;  // with normals

@@ -97,7 +97,7 @@ ParameterValues values_at(const MethodParameters& parameters, Method method, Sto
 
 // One zoom's values for the stages. REQUIRES: a value for each of parameters_of(method, stop).
 struct MethodFrame {
-  HeightSteps height_steps;
+  HeightSteps height_steps = {};
   double side_depth_m = std::numeric_limits<double>::infinity();
   Curvature curvature = Curvature::kCounts;
   std::uint64_t seed = 0;  // of all that is random

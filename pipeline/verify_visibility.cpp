@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kWideDeg = 60;
 // Above the highest vertex.
-constexpr std::array<double, 5> kHeightsAbove_m = {50, 3e3, 1e5, 2e6, 3e7};
+constexpr std::array<double, 5> kHeightsAboveM = {50, 3e3, 1e5, 2e6, 3e7};
 // Cameras over a tile stand in the middle of so many rows and columns of it.
 constexpr int kRowsOfCameras = 5;
 constexpr double kCameraStepDeg = 30;
@@ -79,7 +79,7 @@ std::vector<GeoPoint> cameras_around(const RectangleDeg& rectangle, double highe
   std::vector<GeoPoint> cameras;
   const double width_deg = rectangle.east_deg - rectangle.west_deg;
   const auto add = [&](double longitude_deg, double latitude_deg) {
-    for (const double above_m : kHeightsAbove_m) {
+    for (const double above_m : kHeightsAboveM) {
       cameras.push_back({.longitude_deg = longitude_deg,
                          .latitude_deg = latitude_deg,
                          .height_m = std::max(0.0, highest_m) + above_m});
@@ -102,7 +102,7 @@ std::vector<GeoPoint> cameras_around(const RectangleDeg& rectangle, double highe
   }
   // Where the middles of the west and east sides are on the horizon.
   const double middle_deg = (rectangle.south_deg + rectangle.north_deg) / 2;
-  for (const double above_m : kHeightsAbove_m) {
+  for (const double above_m : kHeightsAboveM) {
     const double height_m = std::max(0.0, highest_m) + above_m;
     const double beyond_deg = horizon_deg(height_m) + kBeyondHorizonDeg;
     for (const double longitude_deg :

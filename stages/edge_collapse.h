@@ -26,7 +26,7 @@ namespace qmpipe {
 
 struct EdgeCollapseOptions {
   // Vertex heights are multiples of this (DESIGN 5.4).
-  HeightSteps height_steps;
+  HeightSteps height_steps = {};
   // How deep a chord of a free side may sink below the globe.
   double side_depth_m = std::numeric_limits<double>::infinity();
   // Keeps every post within this of the surface; none: least_edges alone decides.

@@ -23,7 +23,7 @@ struct GreedyOptions {
   // The zoom's tolerance g(z), the paper's g_e. REQUIRES: > height_steps.side_m / 2.
   double tolerance_m = 0;
   // Vertex heights are multiples of this (DESIGN 5.4).
-  HeightSteps height_steps;
+  HeightSteps height_steps = {};
   // How deep a chord of a free side may sink below the globe.
   double side_depth_m = std::numeric_limits<double>::infinity();
   // The paper's g_g: a regular grid of this many cells a side is inserted first; 0 for none.

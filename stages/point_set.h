@@ -30,7 +30,7 @@ enum class PointSetMethod {
 struct PointSetOptions {
   PointSetMethod method = PointSetMethod::kRandom;
   // Vertex heights are multiples of this (DESIGN 5.4).
-  HeightSteps height_steps;
+  HeightSteps height_steps = {};
   // How deep a chord of a free side may sink below the globe.
   double side_depth_m = std::numeric_limits<double>::infinity();
   std::uint64_t seed = 0;
