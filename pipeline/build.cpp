@@ -88,19 +88,6 @@ void note_grids(const std::vector<RasterInfo>& sources, Progress& progress) {
       grids.size() == 1 ? "one grid" : fmt::format("{} grids", grids.size())));
 }
 
-// Reducing is what makes coarse posts right, so a smaller --max-zoom does not spare it.
-void note_sampling(const SurveyOptions& survey, const std::vector<RasterInfo>& sources,
-                   Progress& progress) {
-  const std::int32_t zoom = chosen_sampling_zoom(survey, sources);
-  if (survey.max_zoom < 0 || survey.max_zoom >= zoom) return;
-  const std::int64_t posts =
-      expected_blocks(survey.scheme, zoom, sources) * (std::int64_t{kBlockPosts} * kBlockPosts);
-  progress.note(fmt::format(
-      "tiles end at zoom {}, but posts are taken at zoom {}, where they are no wider apart than "
-      "the pixels, and reduced: at most {} posts, {} while the run lasts",
-      survey.max_zoom, zoom, posts, bytes_text(posts * static_cast<std::int64_t>(sizeof(float)))));
-}
-
 void require_data(const Survey& survey) {
   if (!survey.tiles.front().empty()) return;
   std::string names;
