@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <cstdint>
+#include <algorithm>
+#include <array>
 
 namespace qmpipe {
 namespace {
@@ -41,6 +42,35 @@ bool is_shown(std::uint32_t code) {
                             (code >= 0x202A && code <= 0x202E) ||
                             (code >= 0x2066 && code <= 0x2069);
   return !is_control && !is_separator && !is_direction;
+}
+
+struct CodeRange {
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;
+};
+// Unicode's wide and full-width characters, and what is narrow between them where the gaps are small.
+constexpr std::array<CodeRange, 16> kWide = {{{0x1100, 0x115F},
+                                              {0x231A, 0x231B},
+                                              {0x2329, 0x232A},
+                                              {0x23E9, 0x23F3},
+                                              {0x25FD, 0x27BF},
+                                              {0x2B1B, 0x2B55},
+                                              {0x2E80, 0xA4CF},
+                                              {0xA960, 0xA97F},
+                                              {0xAC00, 0xD7A3},
+                                              {0xF900, 0xFAFF},
+                                              {0xFE10, 0xFE6F},
+                                              {0xFF00, 0xFF60},
+                                              {0xFFE0, 0xFFE6},
+                                              {0x16FE0, 0x1B2FF},
+                                              {0x1F000, 0x1FAFF},
+                                              {0x20000, 0x3FFFF}}};
+
+std::int64_t columns_of_code(std::uint32_t code) {
+  const bool is_wide = std::any_of(kWide.begin(), kWide.end(), [code](const CodeRange& range) {
+    return code >= range.first && code <= range.last;
+  });
+  return is_wide ? 2 : 1;
 }
 
 std::string replaced(std::string_view text, char from, const char* to) {
@@ -104,6 +134,27 @@ std::string printable_message(std::string_view text) {
     shown.erase(at + 1, 2);
   }
   return shown;
+}
+
+std::int64_t columns_of(std::string_view line) {
+  std::int64_t columns = 0;
+  while (!line.empty()) {
+    const Character first = first_of(line);
+    columns += columns_of_code(first.code);
+    line.remove_prefix(first.bytes);
+  }
+  return columns;
+}
+
+std::string cut_to_columns(std::string_view line, std::int64_t columns) {
+  std::size_t kept = 0;
+  while (kept < line.size()) {
+    const Character first = first_of(line.substr(kept));
+    columns -= columns_of_code(first.code);
+    if (columns < 0) break;
+    kept += first.bytes;
+  }
+  return std::string(line.substr(0, kept));
 }
 
 }  // namespace qmpipe

@@ -2,6 +2,7 @@
 // units and paths must not steer the one or forge a line of the other.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -30,5 +31,12 @@ std::string printable_line(std::string_view text);
 // The same for a message of several lines: those after the first are indented, so that none of them can
 // pass for a message of its own.
 std::string printable_message(std::string_view text);
+
+// How many columns of a terminal a printable line takes: two for what East Asian writing and emoji make
+// twice as wide. It may be fewer where a terminal puts marks on top of each other, but never more.
+std::int64_t columns_of(std::string_view line);
+
+// As much of the line as fits, whole characters only. REQUIRES: columns >= 0.
+std::string cut_to_columns(std::string_view line, std::int64_t columns);
 
 }  // namespace qmpipe

@@ -17,6 +17,8 @@
 #include "pipeline/block_cover.h"
 #include "pipeline/build_plan.h"
 #include "pipeline/fingerprint.h"
+#include "pipeline/forecast.h"
+#include "pipeline/keep_survey.h"
 #include "pipeline/memory_share.h"
 #include "pipeline/mesh_pass.h"
 #include "pipeline/process_memory.h"
@@ -35,20 +37,6 @@ void require_sound(const BuildOptions& options) {
   std::string text = "the options cannot be used:";
   for (const std::string& rule : rules) text += "\n  " + rule;
   throw UsageError(text);
-}
-
-SurveyOptions survey_options(const BuildOptions& options) {
-  return {.inputs = options.input.paths,
-          .source_crs = options.input.source_crs,
-          .heights = options.input.heights,
-          .tally = std::make_shared<HeightTally>(options.input.guard),
-          .resampling = options.input.resampling,
-          .reduction = options.mesh.reduction,
-          .scheme = TilingScheme(options.mesh.projection),
-          .sampling_zoom = -1,
-          .max_zoom = options.mesh.max_zoom.value_or(-1),
-          .threads = options.run.threads,
-          .open_sources = sources_open_at_once(options.run.threads)};
 }
 
 // Before anything is made on disk: where nobody names the deepest zoom, the pixels decide it.
@@ -157,7 +145,8 @@ std::filesystem::path run_folder(const BuildOptions& options) {
 void note_resumption(const RunRecord& record, Progress& progress) {
   std::string done;
   if (const auto zoom = record.coarsest_surveyed()) {
-    done += fmt::format(", the survey is done down to zoom {}", *zoom);
+    done += *zoom == 0 ? ", the survey is done"
+                       : fmt::format(", the survey is done down to zoom {}", *zoom);
   }
   if (record.tiles().tiles_done > 0) {
     done += fmt::format(", {} tiles are done", record.tiles().tiles_done);
@@ -195,8 +184,9 @@ MemoryRequest memory_request(const BuildOptions& options) {
 MemoryShare share_for(const BuildOptions& options, const SurveyOptions& survey,
                       const std::vector<RasterInfo>& sources, const RunPlace& place) {
   MemoryRequest request = memory_request(options);
-  if (place.record != nullptr && place.record->coarsest_surveyed()) {
-    request.deepest_memory_zoom = *place.record->coarsest_surveyed() - 1;
+  if (place.record != nullptr) {
+    request.deepest_memory_zoom =
+        place.record->coarsest_on_disk(chosen_sampling_zoom(survey, sources)) - 1;
   }
   return share_memory(request, survey, sources);
 }
@@ -204,14 +194,17 @@ MemoryShare share_for(const BuildOptions& options, const SurveyOptions& survey,
 void place_store(SurveyOptions& survey, const MemoryShare& share, const BuildOptions& options,
                  RunPlace& place, Progress& progress) {
   survey.record = place.record.get();
+  survey.keep_after_s = options.run.checkpoint_s;
   if (share.store_bytes == 0) return;
   survey.last_memory_zoom = share.last_memory_zoom;
   survey.block_cache_bytes = share.block_cache_bytes;
   if (place.record == nullptr) place.scratch = std::make_unique<ScratchFolder>(run_folder(options));
   survey.store_folder = place.record != nullptr ? place.record->folder() : place.scratch->path();
-  progress.note(fmt::format(
-      "the lattice of the zooms deeper than {} is kept in {}: at most {} of disk",
-      share.last_memory_zoom, survey.store_folder.string(), bytes_text(share.store_bytes)));
+  const std::string which = share.last_memory_zoom < 0 ? ""
+                                                       : fmt::format(" of the zooms deeper than {}",
+                                                                     share.last_memory_zoom);
+  progress.note(fmt::format("the lattice{} is kept in {}: at most {} of disk", which,
+                            survey.store_folder.string(), bytes_text(share.store_bytes)));
 }
 
 // The folder that is there once the sink is open, on the disk that the tiles go to.
@@ -254,14 +247,18 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
                                 survey.pole_heights);
   BuildResult result;
   result.recipe = plan.recipe;
-  result.estimate = estimate_build(options, plan, heightfield, memory);
+  result.estimate = keeping_survey(to_survey, survey, progress, [&] {
+    return estimate_build(options, survey, plan, heightfield, memory, progress);
+  });
   result.estimate.store_bytes = share.store_bytes;
   progress.event(estimate_json(result.estimate));
   if (options.run.dry_run) return result;
   note_estimate(options, result.estimate, progress);
 
-  result.report =
-      run_mesh_pass(options, plan, heightfield, memory, *sink, place.record.get(), progress);
+  progress.correct(mesh_phase(result.estimate));
+  result.report = keeping_survey(to_survey, survey, progress, [&] {
+    return run_mesh_pass(options, plan, heightfield, memory, *sink, place.record.get(), progress);
+  });
   result.report.source_reads = survey.source_reads;
   result.report.survey_s = survey.seconds;
   result.report.peak_resident_bytes = peak_resident_bytes();
@@ -312,6 +309,20 @@ std::optional<FinishedSet> found_set(const BuildOptions& options) {
 
 }  // namespace
 
+SurveyOptions survey_options(const BuildOptions& options) {
+  return {.inputs = options.input.paths,
+          .source_crs = options.input.source_crs,
+          .heights = options.input.heights,
+          .tally = std::make_shared<HeightTally>(options.input.guard),
+          .resampling = options.input.resampling,
+          .reduction = options.mesh.reduction,
+          .scheme = TilingScheme(options.mesh.projection),
+          .sampling_zoom = -1,
+          .max_zoom = options.mesh.max_zoom.value_or(-1),
+          .threads = options.run.threads,
+          .open_sources = sources_open_at_once(options.run.threads)};
+}
+
 BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   require_sound(options);
   const tbb::global_control workers(tbb::global_control::max_allowed_parallelism,
@@ -327,6 +338,7 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   note_sources(sources, progress);
   note_grids(sources, progress);
   note_sampling(to_survey, sources, progress);
+  progress.expect(phases_of_build(options, to_survey, sources));
   // Refuses what cannot work before anything is made on disk.
   share_memory(memory_request(options), to_survey, sources);
   const std::vector<std::filesystem::path> made = missing_folders(options.output.path);

@@ -13,6 +13,7 @@
 #include "pipeline/finished_set.h"
 #include "pipeline/progress.h"
 #include "pipeline/report.h"
+#include "pipeline/survey.h"
 
 namespace qmpipe {
 
@@ -24,6 +25,9 @@ struct BuildResult {
   // The output was what the options ask for, and nothing was done.
   std::optional<FinishedSet> found;
 };
+
+// What its survey is asked for.
+SurveyOptions survey_options(const BuildOptions& options);
 
 BuildResult build_pyramid(const BuildOptions& options, Progress& progress);
 

@@ -6,6 +6,7 @@
 
 #include "formats/errors.h"
 #include "formats/tile_set.h"
+#include "pipeline/forecast.h"
 #include "pipeline/stopwatch.h"
 #include "pipeline/verify_source.h"
 #include "stages/mesh_order.h"
@@ -16,13 +17,35 @@ namespace {
 
 constexpr int kTrialRuns = 5;
 
-ComparedMethod build_and_measure(const CompareOptions& options, const ComparedChoice& choice,
-                                 Progress& progress) {
+BuildOptions build_options_of(const CompareOptions& options, const ComparedChoice& choice) {
   BuildOptions build = options.build;
   build.mesh.method = choice.method;
   build.mesh.stop = choice.stop;
   build.output.path = options.folder / name_of(choice);
   build.output.overwrite = Overwrite::kYes;
+  return build;
+}
+
+// Of all methods: the time left is that of the whole comparison.
+void expect_phases(const CompareOptions& options, Progress& progress) {
+  const SurveyOptions survey = survey_options(options.build);
+  const std::vector<RasterInfo> sources = describe_inputs(survey);
+  std::vector<ExpectedPhase> phases;
+  for (const ComparedChoice& choice : options.methods) {
+    const BuildOptions build = build_options_of(options, choice);
+    const auto to_build = phases_of_build(build, survey, sources);
+    const auto to_verify = phases_of_verify(expected_tiles(build, survey, sources),
+                                            AgainstSource::kYes, build.run.threads);
+    phases.insert(phases.end(), to_build.begin(), to_build.end());
+    phases.insert(phases.end(), to_verify.begin(), to_verify.end());
+  }
+  phases.push_back({.name = "survey"});
+  progress.expect(std::move(phases));
+}
+
+ComparedMethod build_and_measure(const CompareOptions& options, const ComparedChoice& choice,
+                                 Progress& progress) {
+  const BuildOptions build = build_options_of(options, choice);
   progress.note(fmt::format("{}: building", name_of(choice)));
   BuildResult built = build_pyramid(build, progress);
   progress.note(fmt::format("{}: measuring", name_of(choice)));
@@ -122,6 +145,7 @@ Comparison compare_methods(const CompareOptions& options, Progress& progress) {
   comparison.inputs = options.build.input.paths;
   comparison.projection = options.build.mesh.projection;
   comparison.threads = options.build.run.threads;
+  expect_phases(options, progress);
   for (const ComparedChoice& choice : options.methods) {
     comparison.methods.push_back(build_and_measure(options, choice, progress));
   }

@@ -165,9 +165,9 @@ DetailModel simplify_base(DetailBase base, const DetailFrame& frame,
   report.finest_triangles = static_cast<std::int64_t>(triangle_count(base));
   report.seam_triangles = static_cast<std::int64_t>(base.seams.size());
   std::vector<OrderedBlock> made(base.blocks.size());
-  progress.begin("simplify", "collapses", to_do);
   tbb::task_arena arena(options.threads);
   arena.execute([&] {
+    const Phase phase(progress, "simplify", "collapses", to_do);
     tbb::parallel_for(std::size_t{0}, base.blocks.size(), [&](std::size_t b) {
       BaseBlock block = std::exchange(base.blocks[b], {});
       DetailRecord record;
@@ -182,7 +182,6 @@ DetailModel simplify_base(DetailBase base, const DetailFrame& frame,
       made[b] = make_detail_block(block.points, block.triangles, record);
     });
   });
-  progress.end();
   DetailModel model;
   model.frame = frame;
   model.interval = options.interval;

@@ -243,16 +243,15 @@ DetailVerifyReport verify_detail(const DetailModel& model, std::int32_t threads,
   for (const DetailBlock& block : model.blocks) levels += static_cast<std::int64_t>(block.levels());
   std::vector<std::optional<std::string>> faults(model.blocks.size());
   std::atomic<std::int64_t> triangles = 0;
-  progress.begin("verify", "levels", 2 * levels);
   tbb::task_arena arena(threads);
   arena.execute([&] {
+    const Phase phase(progress, "verify", "levels", 2 * levels);
     tbb::parallel_for(std::size_t{0}, model.blocks.size(), [&](std::size_t b) {
       BlockWalk walk(model.blocks[b], progress);
       faults[b] = walk.find_fault();
       triangles += walk.triangles_checked();
     });
   });
-  progress.end();
   report.levels_walked = 2 * levels;
   report.triangles_checked = triangles;
   for (std::size_t b = 0; b < faults.size(); ++b) {

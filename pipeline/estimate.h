@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "pipeline/build_plan.h"
+#include "pipeline/progress.h"
+#include "pipeline/survey.h"
 #include "scheduler/memory_budget.h"
 #include "stages/heightfield.h"
 
@@ -29,10 +31,17 @@ struct Estimate {
   std::int32_t sampling_zoom = 0;
 };
 
-// Meshes one to six tiles of each zoom, evenly spaced, without their neighbours' borders, on the
-// run's threads.
-Estimate estimate_build(const BuildOptions& options, const BuildPlan& plan,
-                        const Heightfield& heightfield, const MemoryPlan& memory);
+// Meshes 10 to 64 tiles, or all where they are fewer, without their neighbours' borders, on the run's
+// threads. Tiles are drawn in proportion to what their ranges and valid posts let expect of them, and
+// count by what they turn out to be: bytes come out within a fifth for nine of ten real DEMs, whatever
+// flat or empty tiles stand among the rugged ones.
+// Throws Interrupted when asked to stop.
+Estimate estimate_build(const BuildOptions& options, const Survey& survey, const BuildPlan& plan,
+                        const Heightfield& heightfield, const MemoryPlan& memory,
+                        Progress& progress);
+
+// So many of that many tiles, or one of each zoom where that is more.
+std::int64_t sampled_tiles(std::int64_t tiles);
 
 std::string estimate_text(const Estimate& estimate);
 std::string estimate_json(const Estimate& estimate);  // one line

@@ -174,6 +174,21 @@ std::int64_t simplify_bytes(Method method) {
   return 32LL << 20U;
 }
 
+double usual_tile_s(Method method) {
+  switch (method) {
+    case Method::kGreedy:
+      return 0.02;
+    case Method::kEdgeCollapse:
+      return 0.5;
+    case Method::kPsRandom:
+    case Method::kPsGrid:
+    case Method::kPsHierarchy:
+    case Method::kPsWlop:
+      break;
+  }
+  return 0.2;
+}
+
 namespace {
 Tin simplify_with(const PostGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
                   const GreedyOptions& options) {

@@ -109,6 +109,9 @@ MethodOptions method_options(Method method, Stop stop, const ParameterValues& va
 // What a tile takes while it is simplified, beyond what it takes in flight (measured).
 std::int64_t simplify_bytes(Method method);
 
+// What a tile usually takes of one core, in seconds (measured; DEMs differ by a factor of three).
+double usual_tile_s(Method method);
+
 Tin simplify(const PostGrid& grid, std::span<const float> heights_m, const FixedBorders& fixed,
              const MethodOptions& options);
 

@@ -1,12 +1,9 @@
 #include "pipeline/progress.h"
 
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -16,21 +13,8 @@
 namespace qmpipe {
 namespace {
 
-constexpr auto kInterval = std::chrono::milliseconds(500);
-
-std::string duration_text(double seconds) {
-  const std::int64_t s = std::llround(seconds);
-  if (s >= 3600) return fmt::format("{} h {:02} min", s / 3600, s % 3600 / 60);
-  if (s >= 60) return fmt::format("{} min {:02} s", s / 60, s % 60);
-  return fmt::format("{} s", s);
-}
-
-std::string fill_text(const BufferFill& fill) {
-  return fill.capacity > 0 ? fmt::format("{} {}/{}", fill.name, fill.filled, fill.capacity)
-                           : fmt::format("{} {}", fill.name, fill.filled);
-}
-
-constexpr const char* kClearLine = "\r\033[K";
+// A terminal shows ^C where the cursor is, which must not break the line either.
+constexpr std::int64_t kColumnsLeftFree = 3;
 
 // Past stdio, which may have been told to let no control sequence pass; what is not ours in `text` is
 // printable already. Nobody could be told that it cannot be written.
@@ -51,9 +35,8 @@ std::string line_of(const nlohmann::json& json) {
 
 }  // namespace
 
-Progress::Progress(ProgressStyle style, const std::atomic<bool>* stop)
-    : style_(style), stop_(stop) {
-  if (style_ != ProgressStyle::kSilent) thread_ = std::thread([this] { run(); });
+Progress::Progress(const ProgressOptions& options) : options_(options) {
+  if (options_.style != ProgressStyle::kSilent) thread_ = std::thread([this] { run(); });
 }
 
 Progress::~Progress() {
@@ -65,14 +48,22 @@ Progress::~Progress() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Progress::begin(const std::string& phase, const std::string& unit, std::int64_t total,
-                     std::function<std::vector<BufferFill>()> fills) {
+void Progress::expect(std::vector<ExpectedPhase> phases) {
   const std::scoped_lock lock(mutex_);
-  phase_ = phase;
-  unit_ = unit;
-  total_ = total;
-  fills_ = std::move(fills);
+  time_left_.expect(std::move(phases));
+}
+
+void Progress::correct(const ExpectedPhase& phase) {
+  const std::scoped_lock lock(mutex_);
+  time_left_.correct(phase);
+}
+
+void Progress::begin(PhaseWork work) {
+  const std::scoped_lock lock(mutex_);
+  work_ = std::move(work);
+  time_left_.begin(work_.name);
   done_.store(0);
+  skipped_.store(work_.done_before);
   watch_ = Stopwatch();
   active_ = true;
 }
@@ -81,23 +72,26 @@ void Progress::end() {
   const std::scoped_lock lock(mutex_);
   if (!active_) return;
   report(true);
+  const std::int64_t skipped = skipped_.load(std::memory_order_relaxed);
+  time_left_.end(time_left_.share_of(skipped, work_.total), watch_.seconds());
   active_ = false;
-  fills_ = {};
+  work_ = {};
 }
 
 void Progress::note(const std::string& text) {
   const std::scoped_lock lock(mutex_);
-  if (style_ == ProgressStyle::kJsonLines) {
+  if (options_.style == ProgressStyle::kJsonLines) {
     write_stderr(line_of({{"event", "note"}, {"text", text}}));
-  } else {
-    write_stderr((lines_shown_ > 0 ? kClearLine : "") +
-                 ("qmpipe: " + printable_message(text) + "\n"));
-    lines_shown_ = 0;
+    return;
   }
+  const std::string erasing =
+      shown_columns_ > 0 ? erasing_text(shown_columns_, window_columns()) : std::string();
+  write_stderr(erasing + "qmpipe: " + printable_message(text) + "\n");
+  shown_columns_ = 0;
 }
 
 void Progress::event(const std::string& json_object) {
-  if (style_ != ProgressStyle::kJsonLines) return;
+  if (options_.style != ProgressStyle::kJsonLines) return;
   const std::scoped_lock lock(mutex_);
   write_stderr(printable(json_object) + "\n");
 }
@@ -109,7 +103,7 @@ void Progress::check_stop() const {
 void Progress::run() {
   std::unique_lock lock(mutex_);
   while (!quit_) {
-    wake_.wait_for(lock, kInterval, [this] { return quit_; });
+    wake_.wait_for(lock, options_.interval, [this] { return quit_; });
     if (active_ && !quit_) report(false);
   }
 }
@@ -117,38 +111,56 @@ void Progress::run() {
 // REQUIRES: mutex_ is held.
 void Progress::report(bool final) {
   const double elapsed_s = watch_.seconds();
-  const std::int64_t done = done_.load(std::memory_order_relaxed);
-  const double rate = elapsed_s > 0 ? static_cast<double>(done) / elapsed_s : 0;
-  const double left_s =
-      rate > 0 ? static_cast<double>(std::max<std::int64_t>(0, total_ - done)) / rate : 0;
-  const std::vector<BufferFill> fills = fills_ ? fills_() : std::vector<BufferFill>{};
-  if (style_ == ProgressStyle::kJsonLines) {
-    nlohmann::json line = {{"event", final ? "phase_done" : "progress"},
-                           {"phase", phase_},
-                           {"unit", unit_},
-                           {"done", done},
-                           {"total", total_},
-                           {"elapsed_s", elapsed_s},
-                           {"rate_per_s", rate},
-                           {"eta_s", left_s}};
-    for (const BufferFill& fill : fills) {
-      line["buffers"][fill.name] = {{"filled", fill.filled}, {"capacity", fill.capacity}};
-    }
-    write_stderr(line_of(line));
-    return;
-  }
-  if (style_ != ProgressStyle::kTerminal) return;
-  std::string text = fmt::format(
-      "\r\033[K{}: {}/{} {} ({:.0f} %), {:.0f}/s", phase_, done, total_, unit_,
-      total_ > 0 ? 100.0 * static_cast<double>(done) / static_cast<double>(total_) : 100.0, rate);
+  const std::int64_t worked = done_.load(std::memory_order_relaxed);
+  const std::int64_t skipped = skipped_.load(std::memory_order_relaxed);
+  PhaseState state = {.phase = work_.name,
+                      .unit = work_.unit,
+                      .done = worked + skipped,
+                      .done_before = skipped,
+                      .total = work_.total,
+                      .rate_per_s = elapsed_s > 0 ? static_cast<double>(worked) / elapsed_s : 0};
   if (final) {
-    text += ", took " + duration_text(elapsed_s) + "\n";
+    state.took_s = elapsed_s;
   } else {
-    text += ", " + duration_text(left_s) + " left";
-    for (const BufferFill& fill : fills) text += " | " + fill_text(fill);
+    state.left_s = time_left_.seconds(time_left_.share_of(state.done, state.total),
+                                      time_left_.share_of(skipped, state.total), elapsed_s);
   }
-  lines_shown_ = final ? 0 : 1;
-  write_stderr(text);
+  const bool is_json = options_.style == ProgressStyle::kJsonLines;
+  if (work_.fills && (is_json || (options_.shows_buffers && !final))) state.fills = work_.fills();
+  if (is_json) {
+    write_json(state, elapsed_s);
+  } else if (options_.style == ProgressStyle::kTerminal) {
+    show(state);
+  }
+}
+
+void Progress::write_json(const PhaseState& state, double elapsed_s) {
+  const double units_left =
+      static_cast<double>(std::max<std::int64_t>(0, state.total - state.done));
+  nlohmann::json line = {{"event", state.took_s ? "phase_done" : "progress"},
+                         {"phase", state.phase},
+                         {"unit", state.unit},
+                         {"done", state.done},
+                         {"done_before", state.done_before},
+                         {"total", state.total},
+                         {"elapsed_s", elapsed_s},
+                         {"rate_per_s", state.rate_per_s},
+                         {"eta_s", state.rate_per_s > 0 ? units_left / state.rate_per_s : 0}};
+  if (state.left_s) line["run_left_s"] = *state.left_s;
+  for (const BufferFill& fill : state.fills) {
+    line["buffers"][fill.name] = {{"filled", fill.filled}, {"capacity", fill.capacity}};
+  }
+  write_stderr(line_of(line));
+}
+
+// A phase that is over keeps its line.
+void Progress::show(const PhaseState& state) {
+  const std::int64_t window = window_columns();
+  const std::string line =
+      progress_line(state, std::max<std::int64_t>(1, window - kColumnsLeftFree));
+  const bool stays = state.took_s.has_value();
+  write_stderr(erasing_text(shown_columns_, window) + line + (stays ? "\n" : ""));
+  shown_columns_ = stays ? 0 : columns_of(line);
 }
 
 }  // namespace qmpipe

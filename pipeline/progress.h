@@ -1,11 +1,14 @@
-// What a run says while it works: one block of lines on stderr when that is a terminal, JSON lines
-// when asked for, nothing otherwise. Also the one place where a run learns that it should stop.
+// What a run says while it works: one line on stderr when that is a terminal, JSON lines when asked for,
+// nothing otherwise. Also the one place where a run learns that it should stop.
 //
-// Thread rule: counters and should_stop() are safe from any thread; begin() and end() are called by
-// the thread that runs the phase.
+// On a terminal the line never breaks, however narrow the window is or becomes, and its time is that of
+// the whole run, as far as the phases to come are known.
+// Thread rule: counters and should_stop() are safe from any thread; all else is called by the thread
+// that runs the phases.
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
@@ -16,7 +19,9 @@
 #include <thread>
 #include <vector>
 
+#include "pipeline/progress_line.h"
 #include "pipeline/stopwatch.h"
+#include "pipeline/time_left.h"
 
 namespace qmpipe {
 
@@ -28,65 +33,85 @@ class Interrupted : public std::runtime_error {
 
 enum class ProgressStyle { kSilent, kTerminal, kJsonLines };
 
-// A named bounded buffer or stage, and how full it is now.
-struct BufferFill {
+struct ProgressOptions {
+  ProgressStyle style = ProgressStyle::kSilent;
+  // May be null; else it is read, never written (a signal handler sets it).
+  const std::atomic<bool>* stop = nullptr;
+  // On a terminal; JSON lines always tell them. DEFAULT: no.
+  bool shows_buffers = false;
+  // Between two lines. DEFAULT: 0.5 s.
+  std::chrono::milliseconds interval{500};
+};
+
+struct PhaseWork {
   std::string name;
-  std::int64_t filled = 0;
-  std::int64_t capacity = 0;  // 0: has no bound of its own
+  std::string unit;  // "posts", "tiles"
+  std::int64_t total = 0;
+  // Of them, what an earlier run has done.
+  std::int64_t done_before = 0;
+  // Called from the reporting thread.
+  std::function<std::vector<BufferFill>()> fills = {};
 };
 
 class Progress {
  public:
-  // `stop` may be null; else it is read, never written (a signal handler sets it).
-  Progress(ProgressStyle style, const std::atomic<bool>* stop);
+  explicit Progress(const ProgressOptions& options);
+  Progress(ProgressStyle style, const std::atomic<bool>* stop)
+      : Progress(ProgressOptions{.style = style, .stop = stop}) {}
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  // Starts a phase of `total` units ("posts", "tiles"); `fills` is called from the reporting thread.
-  void begin(const std::string& phase, const std::string& unit, std::int64_t total,
-             std::function<std::vector<BufferFill>()> fills = {});
+  // The phases of the run, in their order (pipeline/time_left.h).
+  void expect(std::vector<ExpectedPhase> phases);
+  void correct(const ExpectedPhase& phase);
+
+  void begin(PhaseWork work);
   void advance(std::int64_t units) { done_.fetch_add(units, std::memory_order_relaxed); }
+  // Units that need no work, because an earlier run has done them.
+  void skip(std::int64_t units) { skipped_.fetch_add(units, std::memory_order_relaxed); }
   void end();
   // A line for the user: on stderr, or as a JSON line {"event":"note"}.
   void note(const std::string& text);
   // A JSON line as it is; ignored in the other styles.
   void event(const std::string& json_object);
 
-  bool should_stop() const { return stop_ != nullptr && stop_->load(std::memory_order_relaxed); }
+  bool should_stop() const {
+    return options_.stop != nullptr && options_.stop->load(std::memory_order_relaxed);
+  }
   // Throws Interrupted when the run should stop.
   void check_stop() const;
-  ProgressStyle style() const { return style_; }
+  ProgressStyle style() const { return options_.style; }
 
  private:
   void report(bool final);
   void run();
+  void show(const PhaseState& state);
+  void write_json(const PhaseState& state, double elapsed_s);
 
-  const ProgressStyle style_;
-  const std::atomic<bool>* stop_;
+  const ProgressOptions options_;
   std::atomic<std::int64_t> done_ = 0;
+  std::atomic<std::int64_t> skipped_ = 0;
   std::mutex mutex_;
   std::condition_variable wake_;
   bool active_ = false;
   bool quit_ = false;
-  std::string phase_;
-  std::string unit_;
-  std::int64_t total_ = 0;
-  std::function<std::vector<BufferFill>()> fills_;
-  Stopwatch watch_;  // of the phase
-  std::int32_t lines_shown_ = 0;
+  PhaseWork work_;
+  TimeLeft time_left_;
+  Stopwatch watch_;                 // of the phase
+  std::int64_t shown_columns_ = 0;  // of the line that stands in the terminal
   std::thread thread_;
 };
 
-// A phase that ends when this goes out of scope, an exception included: `fills` may refer to what
-// the phase's function owns.
+// A phase that ends when this goes out of scope, an exception included: what `work` calls may refer to
+// what the phase's function owns.
 class Phase {
  public:
-  Phase(Progress& progress, const std::string& phase, const std::string& unit, std::int64_t total,
-        std::function<std::vector<BufferFill>()> fills = {})
-      : progress_(progress) {
-    progress_.begin(phase, unit, total, std::move(fills));
+  Phase(Progress& progress, PhaseWork work) : progress_(progress) {
+    progress_.begin(std::move(work));
   }
+  Phase(Progress& progress, const std::string& name, const std::string& unit, std::int64_t total)
+      : Phase(progress, {.name = name, .unit = unit, .total = total}) {}
   ~Phase() { progress_.end(); }
   Phase(const Phase&) = delete;
   Phase& operator=(const Phase&) = delete;

@@ -214,6 +214,11 @@ std::optional<std::int32_t> RunRecord::coarsest_surveyed() const {
   return surveyed_.begin()->first;
 }
 
+std::int32_t RunRecord::coarsest_on_disk(std::int32_t sampling_zoom) const {
+  if (!surveyed_.empty()) return surveyed_.begin()->first;
+  return count_lattice_segments(folder_) > 0 ? sampling_zoom : kMaxZoom + 1;
+}
+
 SurveyedZoom RunRecord::surveyed(std::int32_t zoom, const TilingScheme& scheme) const {
   auto surveyed = read_survey_file(survey_file_path(folder_, zoom), zoom, scheme);
   if (surveyed) return std::move(surveyed.value());

@@ -54,6 +54,9 @@ class RunRecord {
   bool is_surveyed(std::int32_t zoom) const { return surveyed_.contains(zoom); }
   // The coarsest zoom whose survey is on disk.
   std::optional<std::int32_t> coarsest_surveyed() const;
+  // Zooms from here on have posts on disk: those of a survey, or of the sampling zoom that one was at;
+  // beyond all zooms where there are none.
+  std::int32_t coarsest_on_disk(std::int32_t sampling_zoom) const;
   // REQUIRES: is_surveyed(zoom). Throws IoError when the file is not what was written.
   SurveyedZoom surveyed(std::int32_t zoom, const TilingScheme& scheme) const;
   // REQUIRES: the zoom's lattice is on disk.

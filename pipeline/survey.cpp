@@ -1,6 +1,5 @@
 #include "pipeline/survey.h"
 
-#include <fmt/format.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
@@ -24,14 +23,13 @@
 #include "formats/tiered_lattice_store.h"
 #include "pipeline/block_cover.h"
 #include "pipeline/data_rim.h"
+#include "pipeline/keep_survey.h"
 #include "pipeline/sampling_order.h"
 #include "pipeline/stopwatch.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
 namespace {
-
-constexpr std::size_t kManyTiles = 2000;
 
 std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options,
                                       const std::shared_ptr<const std::vector<RasterInfo>>& sources,
@@ -59,9 +57,10 @@ void for_each_in_order(tbb::task_arena& arena, std::int32_t threads, std::size_t
   arena.execute([&] { tbb::parallel_for(0, threads, take, tbb::simple_partitioner()); });
 }
 
-std::unique_ptr<LatticeStore> make_store(const SurveyOptions& options, std::int32_t max_zoom) {
-  auto memory = make_memory_lattice_store(options.scheme, max_zoom);
-  if (options.last_memory_zoom >= max_zoom) return memory;
+void make_store(const SurveyOptions& options, Survey& survey) {
+  const std::int32_t max_zoom = survey.sampling_zoom;
+  survey.store = make_memory_lattice_store(options.scheme, max_zoom);
+  if (options.last_memory_zoom >= max_zoom) return;
   auto disk =
       open_hdf5_lattice_store(options.store_folder, options.scheme,
                               {.max_zoom = max_zoom, .cache_bytes = options.block_cache_bytes});
@@ -69,8 +68,9 @@ std::unique_ptr<LatticeStore> make_store(const SurveyOptions& options, std::int3
     throw IoError("cannot keep the lattice in", options.store_folder.string(), disk.error().message,
                   "remove the folder and run again");
   }
-  return make_tiered_lattice_store(std::move(memory), options.last_memory_zoom,
-                                   std::move(disk.value()));
+  survey.disk = disk->get();
+  survey.store = make_tiered_lattice_store(std::move(survey.store), options.last_memory_zoom,
+                                           std::move(disk.value()));
 }
 
 void keep_present(const LatticeStore& store, std::vector<BlockKey>& blocks) {
@@ -95,18 +95,43 @@ class Surveyor {
   void survey_zoom(std::vector<BlockKey>& blocks, std::int32_t zoom);
   void write_down(std::int32_t zoom);
   void sample(std::vector<BlockKey>& blocks);
-  void reduce_to(std::vector<BlockKey>& blocks);
+  void reduce_to(std::vector<BlockKey>& blocks, std::int32_t zoom);
   void settle_poles(const std::vector<BlockKey>& blocks, std::int32_t zoom);
   std::optional<float> settle_pole(const std::vector<BlockKey>& blocks, const Lattice& lattice,
                                    std::int64_t j) const;
   void list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom);
   SurveyedTile examine(const TileKey& key) const;
+  std::int64_t count_posts(std::vector<BlockKey> blocks);
+  std::int64_t begin_step(std::int32_t zoom, std::size_t count);
 
   const SurveyOptions& options_;
   Progress& progress_;
   tbb::task_arena arena_;
   Survey survey_;
+  std::vector<std::int64_t> posts_of_zoom_;  // at most
 };
+
+// By zoom, and in all.
+std::int64_t Surveyor::count_posts(std::vector<BlockKey> blocks) {
+  std::int64_t all = 0;
+  posts_of_zoom_.resize(static_cast<std::size_t>(survey_.sampling_zoom) + 1);
+  for (std::int32_t zoom = survey_.sampling_zoom; zoom >= 0; --zoom) {
+    if (zoom < survey_.sampling_zoom) blocks = coarser_blocks(survey_.scheme, blocks);
+    const auto posts = std::ssize(blocks) * static_cast<std::int64_t>(kBlockSize);
+    posts_of_zoom_[static_cast<std::size_t>(zoom)] = posts;
+    all += posts;
+  }
+  return all;
+}
+
+// A zoom's posts count half when they are made and half when its tiles are looked at: about as long as
+// both take. Returns by how much progress advances for each of `count` parts.
+std::int64_t Surveyor::begin_step(std::int32_t zoom, std::size_t count) {
+  const std::int64_t half = posts_of_zoom_[static_cast<std::size_t>(zoom)] / 2;
+  const std::int64_t each = count == 0 ? 0 : half / static_cast<std::int64_t>(count);
+  progress_.skip(half - each * static_cast<std::int64_t>(count));
+  return each;
+}
 
 void Surveyor::sample(std::vector<BlockKey>& blocks) {
   const Lattice lattice(survey_.scheme, survey_.sampling_zoom);
@@ -119,13 +144,12 @@ void Surveyor::sample(std::vector<BlockKey>& blocks) {
   // GDAL's datasets belong to one thread; each opens its own.
   tbb::enumerable_thread_specific<std::unique_ptr<Sampler>> samplers(
       [&] { return open_sampler(options_, sources, cache); });
-  const Phase phase(progress_, "survey", "posts",
-                    static_cast<std::int64_t>(blocks.size() * kBlockSize));
+  const std::int64_t step = begin_step(survey_.sampling_zoom, order.size());
   for_each_in_order(arena_, options_.threads, order.size(), [&](std::size_t k) {
     progress_.check_stop();
     const BlockKey& block = order[k];
     if (is_done_already(block)) {
-      progress_.advance(static_cast<std::int64_t>(kBlockSize));
+      progress_.skip(step);
       return;
     }
     const PostWindow window = posts_of(block);
@@ -135,21 +159,26 @@ void Surveyor::sample(std::vector<BlockKey>& blocks) {
       sampler.sample(lattice, window, heights_m);
       survey_.store->put_block(block.zoom, block.x, block.y, heights_m);
     }
-    progress_.advance(static_cast<std::int64_t>(kBlockSize));
+    progress_.advance(step);
   });
   survey_.source_reads = cache->reads();
   keep_present(*survey_.store, blocks);
 }
 
-void Surveyor::reduce_to(std::vector<BlockKey>& blocks) {
+void Surveyor::reduce_to(std::vector<BlockKey>& blocks, std::int32_t zoom) {
+  const std::int64_t step = begin_step(zoom, blocks.size());
   for_each_in_order(arena_, options_.threads, blocks.size(), [&](std::size_t k) {
     progress_.check_stop();
     const BlockKey& block = blocks[k];
-    if (is_done_already(block)) return;
+    if (is_done_already(block)) {
+      progress_.skip(step);
+      return;
+    }
     std::vector<float> heights_m(kBlockSize);
     reduce_block(*survey_.store, survey_.scheme, block.zoom, block.x, block.y, options_.reduction,
                  heights_m);
     survey_.store->put_block(block.zoom, block.x, block.y, heights_m);
+    progress_.advance(step);
   });
   keep_present(*survey_.store, blocks);
 }
@@ -230,16 +259,11 @@ void Surveyor::list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom
   const std::vector<TileKey> keys(candidates.begin(), candidates.end());
   auto& tiles = survey_.tiles[static_cast<std::size_t>(zoom)];
   tiles.resize(keys.size());
-  // Of the few of a coarse zoom nobody need be told.
-  std::optional<Phase> phase;
-  if (keys.size() >= kManyTiles) {
-    phase.emplace(progress_, fmt::format("survey of zoom {}", zoom), "tiles",
-                  static_cast<std::int64_t>(keys.size()));
-  }
+  const std::int64_t step = begin_step(zoom, keys.size());
   for_each_in_order(arena_, options_.threads, keys.size(), [&](std::size_t k) {
     progress_.check_stop();
     tiles[k] = examine(keys[k]);
-    progress_.advance(1);
+    progress_.advance(step);
   });
   std::erase_if(tiles, [](const SurveyedTile& tile) { return tile.valid_posts == 0; });
 }
@@ -270,22 +294,26 @@ bool Surveyor::take_from_record(std::vector<BlockKey>& blocks, std::int32_t zoom
 void Surveyor::write_down(std::int32_t zoom) {
   if (options_.record == nullptr || !is_on_disk(zoom)) return;
   survey_.store->seal();
-  const auto at = static_cast<std::size_t>(zoom);
-  SurveyedZoom surveyed{.tiles = {}, .pole_heights_m = survey_.pole_heights[at]};
-  if (zoom <= survey_.max_zoom) surveyed.tiles = survey_.tiles[at];
-  options_.record->add_surveyed(zoom, surveyed);
+  options_.record->add_surveyed(zoom, zoom_of(survey_, zoom));
 }
 
 void Surveyor::survey_zoom(std::vector<BlockKey>& blocks, std::int32_t zoom) {
   if (zoom < survey_.sampling_zoom) blocks = coarser_blocks(survey_.scheme, blocks);
-  if (take_from_record(blocks, zoom)) return;
+  if (take_from_record(blocks, zoom)) {
+    progress_.skip(posts_of_zoom_[static_cast<std::size_t>(zoom)]);
+    return;
+  }
   if (zoom == survey_.sampling_zoom) {
     sample(blocks);
   } else {
-    reduce_to(blocks);
+    reduce_to(blocks, zoom);
   }
   settle_poles(blocks, zoom);
-  if (zoom <= survey_.max_zoom) list_tiles(blocks, zoom);
+  if (zoom <= survey_.max_zoom) {
+    list_tiles(blocks, zoom);
+  } else {
+    begin_step(zoom, 0);
+  }
   write_down(zoom);
 }
 
@@ -294,16 +322,22 @@ Survey Surveyor::run() {
   survey_.scheme = options_.scheme;
   survey_.sampling_zoom = chosen_sampling_zoom(options_, survey_.sources);
   survey_.max_zoom = options_.max_zoom < 0 ? survey_.sampling_zoom : options_.max_zoom;
-  survey_.store = make_store(options_, survey_.sampling_zoom);
+  make_store(options_, survey_);
   survey_.pole_heights.resize(static_cast<std::size_t>(survey_.sampling_zoom) + 1);
   survey_.tiles.resize(static_cast<std::size_t>(survey_.max_zoom) + 1);
 
   std::vector<BlockKey> blocks =
       covered_blocks(survey_.scheme, survey_.sampling_zoom, survey_.sources);
   try {
-    for (std::int32_t zoom = survey_.sampling_zoom; zoom >= 0; --zoom) survey_zoom(blocks, zoom);
+    const Phase phase(progress_, "survey", "posts", count_posts(blocks));
+    for (std::int32_t zoom = survey_.sampling_zoom; zoom >= 0; --zoom) {
+      survey_zoom(blocks, zoom);
+      survey_.coarsest_done = zoom;
+    }
   } catch (const Interrupted&) {
     survey_.store->seal();
+    survey_.seconds = watch.seconds();
+    keep_survey(options_, survey_, progress_);
     throw;
   }
   survey_.seconds = watch.seconds();
@@ -311,6 +345,13 @@ Survey Surveyor::run() {
 }
 
 }  // namespace
+
+SurveyedZoom zoom_of(const Survey& survey, std::int32_t zoom) {
+  const auto at = static_cast<std::size_t>(zoom);
+  SurveyedZoom surveyed{.tiles = {}, .pole_heights_m = survey.pole_heights[at]};
+  if (zoom <= survey.max_zoom) surveyed.tiles = survey.tiles[at];
+  return surveyed;
+}
 
 std::int32_t chosen_sampling_zoom(const SurveyOptions& options,
                                   const std::vector<RasterInfo>& sources) {

@@ -5,11 +5,12 @@
 // has done is not done again; of one that it was at, only the blocks that are missing.
 // Guarantees: the lattice store it fills depends on the sources, the scheme and the options alone,
 // not on threads or interruptions. Throws IoError when a source cannot be read, Interrupted when
-// asked to stop (what is on disk by then is sealed).
+// asked to stop (what is on disk by then is sealed, and what is in memory kept where that is worth it).
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -50,6 +51,8 @@ struct SurveyOptions {
   std::int64_t block_cache_bytes = 16LL << 20U;
   // DEFAULT: none; nothing is written down, and what the folder holds must be nothing.
   RunRecord* record = nullptr;
+  // A run that is asked to stop keeps a survey that took longer (pipeline/keep_survey.h), in seconds.
+  double keep_after_s = std::numeric_limits<double>::infinity();
   // Bounds the decoded source blocks that the threads share while they sample.
   std::int64_t source_cache_bytes = 256LL << 20U;
 };
@@ -60,12 +63,18 @@ struct Survey {
   std::int32_t sampling_zoom = 0;
   std::int32_t max_zoom = 0;
   std::unique_ptr<LatticeStore> store;    // zooms 0..sampling_zoom
+  LatticeStore* disk = nullptr;           // the part of it that is on disk, if there is one
   std::vector<PoleHeights> pole_heights;  // by zoom
   // By zoom 0..max_zoom, each sorted by key; pole rows alone do not make a tile.
   std::vector<std::vector<SurveyedTile>> tiles;
   SourceReads source_reads;
   double seconds = 0;
+  // Deeper ones are done, and this one.
+  std::int32_t coarsest_done = kMaxZoom + 1;
 };
+
+// What is written down of a zoom that is done.
+SurveyedZoom zoom_of(const Survey& survey, std::int32_t zoom);
 
 // The sampling zoom that run_survey() will use for these sources.
 std::int32_t chosen_sampling_zoom(const SurveyOptions& options,

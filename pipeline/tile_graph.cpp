@@ -180,8 +180,11 @@ std::vector<BufferFill> TileGraph::fills() const {
 
 TileGraphResult TileGraph::run() {
   {
-    const Phase phase(progress_, "mesh", "tiles", plan_.tile_count() - options_.first_tile,
-                      [this] { return fills(); });
+    const Phase phase(progress_, {.name = "mesh",
+                                  .unit = "tiles",
+                                  .total = plan_.tile_count(),
+                                  .done_before = options_.first_tile,
+                                  .fills = [this] { return fills(); }});
     dispatch();
     graph_.wait_for_all();
   }

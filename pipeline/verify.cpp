@@ -13,6 +13,7 @@
 
 #include "formats/errors.h"
 #include "formats/foreign_crs.h"
+#include "pipeline/forecast.h"
 #include "pipeline/recipe.h"
 #include "pipeline/verify_borders.h"
 #include "pipeline/verify_outside.h"
@@ -153,6 +154,10 @@ VerifyReport Verification::run() {
   TilesInScheme tiles = tiles_in_scheme(tile_set_, layer_.scheme);
   log_.add_all(std::move(tiles.findings));
   log_.add_all(check_listing(layer_, tiles.keys, tile_set_.strays()));
+  const bool surveys = !options_.sources.empty() && recipe_.has_value();
+  progress_.expect(phases_of_verify(std::ssize(tiles.keys),
+                                    surveys ? AgainstSource::kYes : AgainstSource::kNo,
+                                    options_.threads));
   open_source();
   look_for_missing_tiles(tiles.keys);
   {

@@ -195,12 +195,40 @@ TEST_F(BuildTest, DryRunWritesNothing) {
   EXPECT_FALSE(std::filesystem::exists(options.output.path));
 }
 
+// Sea beside mountains, rims of the data, a hole: what tiles drawn blindly would miss or count twice.
 TEST_F(BuildTest, EstimateIsNearTheResult) {
-  BuildOptions options = options_for({write(hilly_raster(7, 10, 45, 0.01))}, "tiles");
+  std::map<std::string, std::string> dems = {
+      {"hills with a hole", write(hilly_raster(7, 10, 45, 0.01))}};
+  RasterFixture coast = hilly_raster(8, 10, 45, 0.01);
+  coast.width = 900;
+  coast.height = 700;
+  const auto hills = coast.value;
+  coast.value = [hills](int c, int r) { return c + r / 3 < 700 ? 0.0 : hills(c, r); };
+  dems.emplace("a coast", write(coast, "coast.tif"));
+  for (const char* name :
+       {"FR+IT.nc", "N43E007.hgt.zip", "portland-ned-nodata.tif", "Kilauea.utm.nc"}) {
+    if (const auto path = testing::real_data(name)) dems.emplace(name, *path);
+  }
+  for (const auto& [name, path] : dems) {
+    const BuildResult result = run(options_for({path}, "tiles of " + name));
+    const auto real = static_cast<double>(result.report.stored_bytes);
+    EXPECT_EQ(result.estimate.tiles, result.report.tiles) << name;
+    EXPECT_NEAR(static_cast<double>(result.estimate.bytes) / real, 1, 0.25) << name;
+    std::int64_t tiles = 0;
+    for (const ZoomEstimate& zoom : result.estimate.zooms) tiles += zoom.tiles;
+    EXPECT_EQ(tiles, result.report.tiles) << name;
+  }
+}
+
+// Where there are no more tiles than are looked at anyway, only their neighbours' borders are missing.
+TEST_F(BuildTest, EstimateOfAFewTilesLeavesNothingToChance) {
+  BuildOptions options = options_for({write(hilly_raster(12, 10, 45, 0.01))}, "tiles");
+  options.mesh.max_zoom = 3;
   const BuildResult result = run(options);
-  EXPECT_EQ(result.estimate.tiles, result.report.tiles);
-  EXPECT_GT(result.estimate.bytes, result.report.stored_bytes / 2);
-  EXPECT_LT(result.estimate.bytes, result.report.stored_bytes * 2);
+  ASSERT_LE(result.report.tiles, 10);
+  EXPECT_NEAR(static_cast<double>(result.estimate.bytes),
+              static_cast<double>(result.report.stored_bytes),
+              0.03 * static_cast<double>(result.report.stored_bytes));
 }
 
 TEST_F(BuildTest, TooLittleMemoryIsRefusedWithTheLeastThatWorks) {

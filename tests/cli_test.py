@@ -4,15 +4,19 @@
 usage: cli_test.py QMPIPE
 """
 import contextlib
+import fcntl
 import json
 import os
 import pathlib
+import pty
 import re
 import signal
 import sqlite3
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 import unittest
 
@@ -73,6 +77,29 @@ class Cli(unittest.TestCase):
 
     def test_silent_run_has_no_carriage_returns(self):
         self.assertNotIn("\r", self.built.stderr)
+
+    def test_progress_in_a_terminal_fits_its_window(self):
+        big = self.root / "progress.tif"
+        done = run("synth", "-o", big, "--size", "2400x1800", "--bounds", "6,43.5,8,45")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for columns, extra in ((24, ()), (60, ()), (200, ("-v",))):
+            master, slave = pty.openpty()
+            fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+            process = subprocess.Popen(
+                [QMPIPE, "build", big, "-o", self.root / "progress", "--overwrite", *extra],
+                stdout=subprocess.DEVNULL, stderr=slave, stdin=subprocess.DEVNULL)
+            os.close(slave)
+            shown = b""
+            with contextlib.suppress(OSError):  # the other end is closed
+                while piece := os.read(master, 4096):
+                    shown += piece
+            os.close(master)
+            self.assertEqual(process.wait(timeout=60), 0, shown)
+            updates = [line.split("\r")[0] for line in shown.decode().split("\r\x1b[K")[1:]]
+            self.assertTrue(any(line.startswith("mesh") for line in updates), shown)
+            self.assertLessEqual(max(len(line) for line in updates if "qmpipe: " not in line),
+                                 columns)
+            self.assertEqual(" | ready " in shown.decode(), "-v" in extra)
 
     def test_verify_of_own_set_finds_nothing(self):
         done = run("verify", self.tiles, "--source", self.dem)

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <clocale>
+#include <cwchar>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -66,6 +68,50 @@ TEST(Printable, NoLineOfAMessageOrValuePassesForAnother) {
   EXPECT_EQ(printable_line("a\nqmpipe: done\tx"), "a\\nqmpipe: done\\tx");
   EXPECT_EQ(printable_message("cannot open\n  Check it.\nqmpipe: done"),
             "cannot open\n  Check it.\n  qmpipe: done");
+}
+
+std::string utf8(char32_t code) {
+  if (code < 0x80) return {static_cast<char>(code)};
+  std::string text;
+  int rest = code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;
+  const unsigned lead = rest == 1 ? 0xC0 : rest == 2 ? 0xE0 : 0xF0;
+  text += static_cast<char>(lead | code >> (6 * rest));
+  while (--rest >= 0) text += static_cast<char>(0x80U | (code >> (6 * rest) & 0x3FU));
+  return text;
+}
+
+TEST(Columns, NoCharacterTakesMoreThanItCounts) {
+  const std::string before = std::setlocale(LC_CTYPE, nullptr);
+  if (std::setlocale(LC_CTYPE, "C.UTF-8") == nullptr) GTEST_SKIP() << "there is no locale C.UTF-8";
+  for (char32_t code = 0x20; code <= 0x10FFFF; ++code) {
+    if (code >= 0xD800 && code < 0xE000) continue;
+    const auto counted = columns_of(utf8(code));
+    ASSERT_TRUE(counted == 1 || counted == 2) << std::hex << std::uint32_t{code};
+    ASSERT_GE(counted, ::wcwidth(static_cast<wchar_t>(code))) << std::hex << std::uint32_t{code};
+  }
+  std::setlocale(LC_CTYPE, before.c_str());
+}
+
+TEST(Columns, OrdinaryTextCountsExactly) {
+  EXPECT_EQ(columns_of("mesh: 12 % \u00e9\u00fc\u03a9\u2014\u2026"), 16);
+  EXPECT_EQ(columns_of("\u9ad8\u3055 \U0001f5fb"), 7);
+}
+
+TEST(Columns, ACutLineFitsAndLacksNoCharacterThatWouldFit) {
+  const std::string parts[] = {"a", "\u00e9", "\u9ad8", "\U0001f5fb", " ", "\U0001d53b"};
+  for (unsigned seed = 0; seed < 2000; ++seed) {
+    std::mt19937 random(seed);
+    std::string line;
+    for (auto n = random() % 30; n > 0; --n) line += parts[random() % std::size(parts)];
+    const std::int64_t columns = random() % 40;
+    const std::string cut = cut_to_columns(line, columns);
+    ASSERT_TRUE(line.starts_with(cut)) << "seed " << seed;
+    ASSERT_EQ(printable(cut), cut) << "half a character, seed " << seed;
+    ASSERT_LE(columns_of(cut), columns) << "seed " << seed;
+    if (cut != line) {
+      ASSERT_GE(columns_of(cut), columns - 1) << "seed " << seed;
+    }
+  }
 }
 
 }  // namespace

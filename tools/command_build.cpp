@@ -84,7 +84,8 @@ int run_build(const BuildArguments& arguments) {
   ProgressStyle style =
       isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent;
   if (arguments.json) style = ProgressStyle::kJsonLines;
-  Progress progress(style, stop_flag_of_signals());
+  Progress progress(
+      {.style = style, .stop = stop_flag_of_signals(), .shows_buffers = arguments.verbose});
   const BuildResult result = build_pyramid(options, progress);
   std::string text;
   if (result.found) {
@@ -130,9 +131,11 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
   command.add_option("--attribution", output.attribution,
                      "Attribution in layer.json; viewers show it");
   command
-      .add_option("--checkpoint", arguments.checkpoint_s,
-                  "Seconds between two checkpoints: what a crash may cost; 0: none, an interrupted "
-                  "run starts again")
+      .add_option(
+          "--checkpoint", arguments.checkpoint_s,
+          "Seconds between two checkpoints: what a crash may cost; a survey that took longer "
+          "is kept when the run is stopped; 0: nothing is kept, an interrupted run starts "
+          "again")
       ->capture_default_str()
       ->type_name("S");
   command
@@ -145,7 +148,8 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
                    "Stop after the estimate: tiles, size, time, memory");
   command.add_flag("--json", arguments.json,
                    "Report as JSON on stdout, progress as JSON lines on stderr");
-  command.add_flag("-v,--verbose", arguments.verbose, "Print every effective option first");
+  command.add_flag("-v,--verbose", arguments.verbose,
+                   "Print every effective option first, and how full each buffer is meanwhile");
 }
 
 }  // namespace
