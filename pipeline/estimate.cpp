@@ -35,7 +35,7 @@ struct Sample {
 // The tiles of a zoom and what each is expected to weigh, relative to the others.
 struct WeighedZoom {
   const std::vector<TileKey>* keys = nullptr;
-  std::vector<double> weights;
+  std::vector<double> weights = {};
   double sum = 0;
 };
 

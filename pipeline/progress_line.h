@@ -22,9 +22,9 @@ struct PhaseState {
   std::int64_t done_before = 0;  // of them, what needed no work
   std::int64_t total = 0;
   double rate_per_s = 0;
-  std::optional<double> left_s;   // of the whole run
-  std::optional<double> took_s;   // of the phase, once it is over
-  std::vector<BufferFill> fills;  // those to be shown
+  std::optional<double> left_s = {};   // of the whole run
+  std::optional<double> took_s = {};   // of the phase, once it is over
+  std::vector<BufferFill> fills = {};  // those to be shown
 };
 
 // "mesh: 1,234/5,678 tiles (22 %), 310/s, 14 s left", and as much less as fits: buffers go first, then
