@@ -88,7 +88,9 @@ class KeptSurvey(unittest.TestCase):
     def stopped(self, out, *extra, in_mesh):
         for _ in range(30):
             said = self.stop(out, *extra, in_mesh=in_mesh)
-            if said is not None and ("stopped after" in said) == in_mesh:
+            # A run that was stopped while it opened its input had nothing to keep.
+            if said is not None and ("stopped after" if in_mesh else "keeping the survey") in said and (
+                    in_mesh or "stopped after" not in said):
                 return said
             shutil.rmtree(out, ignore_errors=True)
             shutil.rmtree(run_folder(out), ignore_errors=True)
@@ -118,8 +120,7 @@ class KeptSurvey(unittest.TestCase):
         self.assertEqual(self.report(self.out)["source"]["decoded_blocks"], 0)
 
     def test_stopped_in_its_middle_it_goes_on_there(self):
-        said = self.stopped(self.out, in_mesh=False)
-        self.assertIn("keeping the survey", said)
+        self.stopped(self.out, in_mesh=False)
         self.assertTrue(list(run_folder(self.out).glob("lattice-*.h5")))
         done = self.finish(self.out, "--json")
         self.assertIn("going on with the run", done.stderr)

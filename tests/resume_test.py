@@ -250,7 +250,7 @@ class StoppedRuns(ResumeTest):
     def test_terminated_run_writes_a_checkpoint_and_goes_on(self):
         out = self.unfinished("terminated")
         self.assertRegex(self.stop_said, r"stopped after \d+ of \d+ tiles; the checkpoint is kept")
-        counted = journal_lines(out)[-1]["tiles_done"]
+        counted = [line["tiles_done"] for line in journal_lines(out) if "tiles_done" in line][-1]
         self.assertEqual(counted, len(list(out.glob("*/*/*.terrain"))))
         done = self.finish(out)
         self.assertIn(f"going on: {counted} of", done.stderr)
@@ -335,7 +335,7 @@ class StoppedRuns(ResumeTest):
         self.assertTrue((folder / "journal").exists())
         self.assertFalse(run_folder(out).exists())
         done = self.finish(out, "--run-folder", str(folder))
-        self.assertRegex(done.stderr, r"going on with the run in .*run, \d+ tiles are done")
+        self.assertRegex(done.stderr, r"going on with the run in .*run, .*\d+ tiles are done")
         self.assertFalse(folder.exists())
 
     def test_without_checkpoints_nothing_is_kept(self):
