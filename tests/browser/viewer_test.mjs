@@ -5,7 +5,7 @@
 // Screenshots stay in QMPIPE_WORK. readme.png there is the README's picture (docs/terrain.png).
 
 import assert from 'node:assert/strict';
-import { existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { copyFileSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
@@ -190,9 +190,9 @@ test('a browser without WebGL is told so in words', patience, async () => {
 test('a server without CesiumJS says how to get it', patience, async () => {
   const pages = join(work, 'pages');
   mkdirSync(pages, { recursive: true });
-  for (const name of ['index.html', 'viewer.js']) {
-    writeFileSync(join(pages, name),
-                  readFileSync(new URL(`../../tools/viewer/${name}`, import.meta.url)));
+  const source = fileURLToPath(new URL('../../tools/viewer', import.meta.url));
+  for (const name of readdirSync(source)) {
+    if (/\.(html|js)$/.test(name)) copyFileSync(join(source, name), join(pages, name));
   }
   process.env.QMPIPE_VIEWER = pages;
   try {

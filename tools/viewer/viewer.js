@@ -1,20 +1,19 @@
-// The page of `qmpipe serve`. It works behind any static server too: index.html and viewer.js with
-// CesiumJS in the folder "cesium" and the tile set in the folder "tiles" beside them.
+// The page of `qmpipe serve`. It works behind any static server too: index.html, viewer.js and what it
+// imports, with CesiumJS in the folder "cesium" and the tile set in the folder "tiles" beside them.
 //
 // Query: ?tiles=ADDRESS  of the tile set (default: tiles)
 //        ?lon=DEG&lat=DEG&heading=DEG&pitch=DEG&range=METRES  where to look at first
-//        ?wireframe=1  ?boundaries=1  ?ramp=fixed  ?bare=1  switches; bare hides all text
+//        ?wireframe=1  ?boundaries=1  ?extent=0  ?ramp=shore|fitted|fixed  switches
+//        ?bare=1  hides the panels and the data's outline
+
+import { extentOf, rangeOverExtent } from './data_extent.js';
+import { defaultRampKind, drawLegend, keepExtent, paintSkirtsLikeGround, rampOf, roundDown,
+         terrainMaterial } from './terrain_style.js';
 
 const query = new URLSearchParams(location.search);
 const number = (name, fallback) => (query.has(name) ? Number(query.get(name)) : fallback);
+const isBare = query.get('bare') === '1';
 const element = (id) => document.getElementById(id);
-
-// Heights in metres: the sea's depths, the shore, meadows, rock, snow.
-const fixedStops = [[-6000, '#0b2a4a'], [-200, '#2f6f9f'], [0, '#9cc4d6'], [4, '#a9c08f'],
-                    [300, '#8fab6c'], [900, '#cdb98a'], [1800, '#a8927c'], [2800, '#f4f4f2']];
-// Shares of the way from the lowest to the highest.
-const fittedStops = [[0, '#5f8f63'], [0.2, '#a3b877'], [0.45, '#d9c48f'], [0.7, '#a9866a'],
-                     [0.9, '#d8d2cc'], [1, '#ffffff']];
 
 // What people can do something about is thrown as this.
 class Plain extends Error {}
@@ -75,53 +74,10 @@ async function describeSet(tiles) {
     name: layer.name || tiles,
     layer,
     tiles: set.tiles,
-    boundsDeg: set.bounds_deg || layer.bounds || [-180, -90, 180, 90],
-    heights: set.heights_m || [fixedStops[0][0], fixedStops[fixedStops.length - 1][0]],
+    extentDeg: extentOf(layer, set.bounds_deg),
+    heights: set.heights_m,
     changes: set.layer_changes || [],
   };
-}
-
-function rampOf(kind, heights) {
-  let stops = fixedStops;
-  if (kind === 'fitted') {
-    const span = Math.max(heights[1] - heights[0], 1);
-    stops = fittedStops.map(([share, colour]) => [heights[0] + share * span, colour]);
-  }
-  const low = stops[0][0];
-  const high = stops[stops.length - 1][0];
-  const canvas = document.createElement('canvas');
-  canvas.width = 2048;
-  canvas.height = 1;
-  const brush = canvas.getContext('2d');
-  const gradient = brush.createLinearGradient(0, 0, canvas.width, 0);
-  for (const [height, colour] of stops) {
-    gradient.addColorStop((height - low) / (high - low), colour);
-  }
-  brush.fillStyle = gradient;
-  brush.fillRect(0, 0, canvas.width, 1);
-  return { image: canvas, low, high };
-}
-
-// Colours by height; a tile's own coordinates run from 0 to 1, so its sides are known too.
-function terrainMaterial() {
-  const { image, low, high } = rampOf('fixed', []);
-  return new Cesium.Material({
-    fabric: {
-      type: 'QmpipeTerrain',
-      uniforms: { ramp: image, low, high, boundaries: 0 },
-      source: `
-        czm_material czm_getMaterial(czm_materialInput input_) {
-          czm_material material = czm_getDefaultMaterial(input_);
-          float share = clamp((input_.height - low) / (high - low), 0.0, 1.0);
-          vec3 colour = czm_gammaCorrect(texture(ramp, vec2(share, 0.5))).rgb;
-          vec2 off = min(input_.st, 1.0 - input_.st) / max(fwidth(input_.st), vec2(1e-6));
-          float line = 1.0 - smoothstep(0.6, 1.4, min(off.x, off.y));
-          material.diffuse = mix(colour, vec3(0.75, 0.1, 0.05), boundaries * line);
-          material.alpha = 1.0;
-          return material;
-        }`,
-    },
-  });
 }
 
 // Light from the north-west, half-way up, as on printed maps, wherever the camera goes.
@@ -142,18 +98,91 @@ function connectSwitches(viewer, material, set) {
     globe._surface.tileProvider._debug.wireframe = wireframe;
     // Lines are seen against the dark, not against the day's sky from below.
     viewer.scene.skyAtmosphere.show = !wireframe;
-    globe.showGroundAtmosphere = !wireframe;
-    material.uniforms.boundaries = element('boundaries').checked ? 1 : 0;
+    const extent = element('extent').checked ? 1 : 0;
+    Object.assign(material.uniforms, {
+      boundaries: element('boundaries').checked ? 1 : 0, extent, outline: isBare ? 0 : extent,
+    });
     globe.enableLighting = element('lighting').checked;
-    const { image, low, high } = rampOf(element('ramp').value, set.heights);
-    Object.assign(material.uniforms, { ramp: image, low, high });
+    const { image, low, pivot, high } = rampOf(element('ramp').value, set.heights);
+    Object.assign(material.uniforms, { ramp: image, low, pivot, high });
+    drawLegend(element('legend'), { image, low, pivot, high });
     viewer.scene.requestRender();
   };
   for (const name of ['wireframe', 'boundaries']) element(name).checked = query.get(name) === '1';
-  if (query.get('ramp') === 'fixed') element('ramp').value = 'fixed';
+  element('extent').checked = query.get('extent') !== '0';
+  element('ramp').value = query.get('ramp') || defaultRampKind(set.heights);
+  if (element('ramp').selectedIndex < 0) element('ramp').value = defaultRampKind(set.heights);
+  element('display').open = window.innerWidth >= 600;
   element('switches').addEventListener('change', apply);
-  element('switches').style.display = 'block';
+  element('home').addEventListener('click', () => lookAtExtent(viewer, set, (name, usual) => usual));
+  element('switches').style.display = 'flex';
+  element('legend').style.display = 'block';
   apply();
+}
+
+// The set's own words may be HTML. Its texts and web links are shown, nothing else of it is loaded.
+function attributionOf(html) {
+  const line = document.createElement('span');
+  const copy = (from, to) => {
+    for (const node of from.childNodes) {
+      if (node.nodeType === Node.TEXT_NODE) to.append(node.textContent);
+      if (node.nodeType !== Node.ELEMENT_NODE || /^(script|style)$/i.test(node.tagName)) continue;
+      const address = node.tagName === 'A' ? node.getAttribute('href') || '' : '';
+      const isLink = /^https?:\/\//i.test(address);
+      const part = document.createElement(isLink ? 'a' : 'span');
+      if (isLink) Object.assign(part, { href: address, target: '_blank', rel: 'noopener' });
+      copy(node, part);
+      to.append(part);
+    }
+  };
+  copy(new DOMParser().parseFromString(html, 'text/html').body, line);
+  return line;
+}
+
+function showCredits(layer) {
+  const software = Object.assign(document.createElement('a'), {
+    href: 'https://cesium.com/cesiumjs/', target: '_blank', rel: 'noopener', textContent: 'CesiumJS',
+  });
+  const credits = element('credits');
+  credits.replaceChildren();
+  if (layer.attribution) {
+    const attribution = attributionOf(`${layer.attribution}`);
+    attribution.id = 'attribution';
+    credits.append(attribution, ' | ');
+  }
+  credits.append(software);
+}
+
+function showLoading(viewer) {
+  const box = element('loading');
+  viewer.scene.globe.tileLoadProgressEvent.addEventListener((waiting) => {
+    box.style.display = waiting > 0 ? 'block' : 'none';
+    box.textContent = `loading ${waiting} ${waiting === 1 ? 'tile' : 'tiles'}`;
+  });
+}
+
+// For lengths across the picture, at what is seen in its middle.
+function showScale(viewer) {
+  const { scene } = viewer;
+  const box = element('scale');
+  let last = '';
+  scene.postRender.addEventListener(() => {
+    const { clientWidth, clientHeight } = scene.canvas;
+    const ray = scene.camera.getPickRay(new Cesium.Cartesian2(clientWidth / 2, clientHeight / 2));
+    const hit = ray && scene.globe.pick(ray, scene);
+    box.style.display = hit ? 'block' : 'none';
+    if (!hit) return;
+    const place = new Cesium.BoundingSphere(hit, 0);
+    const metresAPixel = scene.camera.getPixelSize(place, clientWidth, clientHeight);
+    const length = roundDown(110 * metresAPixel);
+    const text = length >= 1000 ? `${length / 1000} km`
+        : (length >= 1 ? `${length} m` : `${Math.round(length * 100)} cm`);
+    const width = `${Math.round(length / metresAPixel)}px`;
+    if (last === text + width) return;
+    last = text + width;
+    box.textContent = text;
+    box.style.width = width;
+  });
 }
 
 const placeText = (degrees, positive, negative) =>
@@ -184,20 +213,22 @@ function showHeightUnderCursor(viewer, terrainProvider) {
   }, Cesium.ScreenSpaceEventType.MOUSE_MOVE);
 }
 
-function lookAtData(viewer, set) {
-  const [west, south, east, north] = set.boundsDeg;
-  const middle = (set.heights[0] + set.heights[1]) / 2;
-  const centre = Cesium.Cartesian3.fromDegrees(number('lon', (west + east) / 2),
-                                               number('lat', (south + north) / 2),
-                                               Math.max(-12000, Math.min(middle, 9000)));
-  const metresADegree = 111320;
-  const wide = (east - west) * metresADegree *
-      Math.max(0.1, Math.cos(Cesium.Math.toRadians((south + north) / 2)));
-  const high = (north - south) * metresADegree;
-  const range = number('range', Math.min(1.2 * Math.max(wide, high), 2e7));
+// `choose(name, usual)`: what a query wants instead of what shows all of the data.
+function lookAtExtent(viewer, set, choose) {
+  const [west, south, east, north] = set.extentDeg;
+  const { clientWidth, clientHeight } = viewer.scene.canvas;
+  const shape = clientWidth / Math.max(clientHeight, 1);
+  const [low, high] = set.heights || [0, 0];
+  const centre = Cesium.Cartesian3.fromDegrees(choose('lon', (west + east) / 2),
+                                               choose('lat', (south + north) / 2),
+                                               Math.max(-12000, Math.min((low + high) / 2, 9000)));
+  const tilted = -40;
+  let range = choose('range', rangeOverExtent(set.extentDeg, tilted, shape));
+  const pitch = choose('pitch', range > 5e6 ? -90 : tilted);
+  range = choose('range', rangeOverExtent(set.extentDeg, pitch, shape));
   viewer.camera.lookAt(centre, new Cesium.HeadingPitchRange(
-      Cesium.Math.toRadians(number('heading', 15)),
-      Cesium.Math.toRadians(number('pitch', range > 5e6 ? -90 : -40)), range));
+      Cesium.Math.toRadians(choose('heading', pitch === -90 ? 0 : 15)), Cesium.Math.toRadians(pitch),
+      range));
   viewer.camera.lookAtTransform(Cesium.Matrix4.IDENTITY);
 }
 
@@ -205,8 +236,13 @@ async function show() {
   requireWebGl();
   const tiles = query.get('tiles') || 'tiles';
   const [set] = await Promise.all([describeSet(tiles), loadCesium()]);
+  paintSkirtsLikeGround();
+  showCredits(set.layer);
   const terrainProvider =
       await Cesium.CesiumTerrainProvider.fromUrl(tiles, { requestVertexNormals: true });
+  // The page shows layer.json's attribution itself, and no logo of a service that is not used.
+  Cesium.CreditDisplay.cesiumCredit = undefined;
+  terrainProvider._tileCredits = undefined;
   const viewer = new Cesium.Viewer('globe', {
     terrainProvider, baseLayer: false, baseLayerPicker: false, geocoder: false, timeline: false,
     animation: false, homeButton: false, sceneModePicker: false, navigationHelpButton: false,
@@ -222,16 +258,25 @@ async function show() {
     if (errors.length <= 3) complain(error.message);
   });
   const scene = viewer.scene;
-  scene.globe.dynamicAtmosphereLighting = false;
+  // Air between the eye and the ground would wash the colours out of which heights are read. Fog stays
+  // as what spares far tiles.
+  scene.globe.showGroundAtmosphere = false;
+  scene.fog.renderable = false;
+  scene.globe.baseColor = Cesium.Color.fromCssColorString('#303335');
   scene.backgroundColor = Cesium.Color.fromCssColorString('#10151c');
   lightFromNorthWest(scene);
-  const material = terrainMaterial();
+  const material = terrainMaterial(set.extentDeg);
   scene.globe.material = material;
+  keepExtent(scene, material);
   connectSwitches(viewer, material, set);
   showHeightUnderCursor(viewer, terrainProvider);
-  lookAtData(viewer, set);
-  if (query.get('bare') === '1') {
-    for (const id of ['note', 'switches', 'cursor']) element(id).style.visibility = 'hidden';
+  showLoading(viewer);
+  showScale(viewer);
+  lookAtExtent(viewer, set, number);
+  if (isBare) {
+    for (const id of ['note', 'switches', 'loading', 'cursor', 'scale', 'legend']) {
+      element(id).style.visibility = 'hidden';
+    }
   }
   // For the console, and for the tests.
   window.qmpipe = { viewer, terrainProvider, errors, set };
