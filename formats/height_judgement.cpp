@@ -121,7 +121,9 @@ struct OutsideEnd {
     std::string what = fmt::format("{} to {}", is_deep ? "go down" : "go up",
                                    value_text(outermost.front().value, rule));
     for (std::size_t k = 0; k < values.size(); ++k) {
-      what = (k == 0 ? "hold " : what + " or ") + value_text(values[k], rule);
+      if (k == 0) what = "hold ";
+      if (k > 0) what += " or ";
+      what += value_text(values[k], rule);
     }
     return fmt::format("{} of {} pixels {}, and nothing on Earth is {} than {} m", end.count, of,
                        what, is_deep ? "lower" : "higher",
