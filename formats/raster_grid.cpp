@@ -53,18 +53,19 @@ bool leaves_degrees_alone(const CrsTransform& transform, std::span<const MapPoin
   });
 }
 
-// x of a longitude on some parallels, but for what a datum makes: cheap beside turn_along_x().
+// False where x of a longitude is another on another parallel by more than a datum makes: cheap
+// beside turn_along_x(). Operations that do not reach the whole globe say little.
 bool may_go_round(const CrsTransform& transform) {
   constexpr double kSamePart = 1e-3;
   for (const double longitude_deg : {-100.3, 20.7, 140.1}) {
-    const std::optional<MapPoint> middle =
-        transform.forward({.longitude_deg = longitude_deg, .latitude_deg = 0});
-    if (!middle) return false;
-    for (const double latitude_deg : {-50.0, 50.0}) {
-      const std::optional<MapPoint> there =
-          transform.forward({.longitude_deg = longitude_deg, .latitude_deg = latitude_deg});
-      const double size = std::abs(middle->x) + (there ? std::abs(there->y) : 0);
-      if (!there || !(std::abs(there->x - middle->x) <= kSamePart * size)) return false;
+    const auto at = [&](double latitude_deg) {
+      return transform.forward({.longitude_deg = longitude_deg, .latitude_deg = latitude_deg});
+    };
+    const std::optional<MapPoint> middle = at(0);
+    for (const std::optional<MapPoint>& there : {at(-50), at(50)}) {
+      if (!middle || !there) continue;
+      const double size = std::abs(middle->x) + std::abs(there->y);
+      if (!(std::abs(there->x - middle->x) <= kSamePart * size)) return false;
     }
   }
   return true;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "stages/base_tin.h"
@@ -15,6 +16,8 @@
 
 namespace qmpipe {
 namespace {
+
+constexpr double kAnyDepth = std::numeric_limits<double>::infinity();
 
 using namespace testing;  // NOLINT(google-build-using-namespace): the fixture, in a test
 
@@ -173,7 +176,7 @@ class CollapseRules : public ::testing::Test {
       heights_m_.push_back(static_cast<float>(random() % 50));
     }
     tin_ = base_tin(grid_, heights_m_, {}, 1);
-    surface_.emplace(grid_, tin_, fixed, 1, CollapseWeights{});
+    surface_.emplace(grid_, tin_, fixed, 1, kAnyDepth, CollapseWeights{});
   }
 
   Index half_edge(std::int32_t from, std::int32_t to) const {
@@ -278,7 +281,8 @@ TEST_F(CollapseRules, AlongAFreeSideTheCheaperEndStays) {
   for (const std::int32_t post : {0, 1, 3}) heights_m_[static_cast<std::size_t>(post)] = 0;
   heights_m_[2] = 50;
   for (const std::size_t post : {4U, 5U, 6U, 7U}) heights_m_[post] = 0;
-  surface_.emplace(grid_, base_tin(grid_, heights_m_, {}, 1), FixedBorders{}, 1, CollapseWeights{});
+  surface_.emplace(grid_, base_tin(grid_, heights_m_, {}, 1), FixedBorders{}, 1, kAnyDepth,
+                   CollapseWeights{});
   const auto candidate = surface_->best(half_edge(1, 2));
   ASSERT_TRUE(candidate);
   EXPECT_EQ(candidate->kept, 2);

@@ -103,7 +103,7 @@ TEST(Columns, ACutLineFitsAndLacksNoCharacterThatWouldFit) {
     std::mt19937 random(seed);
     std::string line;
     for (auto n = random() % 30; n > 0; --n) line += parts[random() % std::size(parts)];
-    const std::int64_t columns = random() % 40;
+    const auto columns = static_cast<std::int64_t>(random() % 40);
     const std::string cut = cut_to_columns(line, columns);
     ASSERT_TRUE(line.starts_with(cut)) << "seed " << seed;
     ASSERT_EQ(printable(cut), cut) << "half a character, seed " << seed;
