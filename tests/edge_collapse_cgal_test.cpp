@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 #include <set>
 
@@ -129,7 +130,8 @@ TEST(LindstromTurk, PlacesAndCostsAreThoseOfCgal) {
         .volume = 0.5, .boundary = 0.25, .shape = seed % 2 == 0 ? 1e-10 : 0.01};
     const smp::internal::LindstromTurk_params params(weights.volume, weights.boundary,
                                                      weights.shape);
-    const CollapseSurface surface(grid, tin, {}, 1, weights);
+    const CollapseSurface surface(grid, tin, {}, 1, std::numeric_limits<double>::infinity(),
+                                  weights);
     const CollapseMesh& mesh = surface.mesh();
     std::set<int> met;
     for (Index e = 0; e < mesh.half_edge_count(); ++e) {

@@ -290,7 +290,7 @@ TEST_F(CollapseRules, AlongAFreeSideTheCheaperEndStays) {
 
 TEST_F(CollapseRules, EqualEndsOfASideLeaveTheLowerPost) {
   heights_m_.assign(grid_.post_count(), 7.0F);
-  surface_.emplace(grid_, base_tin(grid_, heights_m_, {}, 1), FixedBorders{}, 1,
+  surface_.emplace(grid_, base_tin(grid_, heights_m_, {}, 1), FixedBorders{}, 1, kAnyDepth,
                    CollapseWeights{.volume = 1, .boundary = 1, .shape = 0});
   EXPECT_EQ(surface_->best(half_edge(1, 2))->kept, 1);
   EXPECT_EQ(surface_->best(half_edge(14, 13))->kept, 13);

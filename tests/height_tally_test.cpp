@@ -74,7 +74,7 @@ TEST(ValueCounts, AreExactInWhateverPiecesValuesCome) {
   for (std::uint32_t seed = 0; seed < 60; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
-    const std::uint32_t distinct = 1 + random() % 40;
+    const auto distinct = static_cast<std::uint32_t>(1 + random() % 40);
     std::vector<double> values(1 + random() % 3000);
     std::map<double, std::int64_t> expected;
     std::int64_t count = 0;
@@ -198,7 +198,9 @@ TEST(HeightTally, TheOptionThatItNamesWorksForEveryKindOfUndeclaredVoid) {
     for (const Through through : {Through::kCache, Through::kGdal}) {
       const Reading first = read_with(path, {}, HeightGuard::kStop, through);
       EXPECT_EQ(!first.refusal.empty(), one.stops) << first.advice();
-      if (one.stops) EXPECT_THAT(first.refusal, HasSubstr("--allow-heights"));
+      if (one.stops) {
+        EXPECT_THAT(first.refusal, HasSubstr("--allow-heights"));
+      }
       const HeightOptions options = advice_in(first.advice());
       const auto voids = std::count(is_void.begin(), is_void.end(), true);
       if (one.marks.size() == 1) {

@@ -135,7 +135,7 @@ void JoinedGrids::expect_same_posts(const std::vector<std::string>& uncut,
       Sampler(pool_of(cut), resampling).sample(lattice, window, heights);
       std::size_t valid = 0;
       for (std::size_t k = 0; k < heights.size(); ++k) {
-        valid += std::isnan(expected[k]) ? 0 : 1;
+        valid += std::isnan(expected[k]) ? 0U : 1U;
         ASSERT_TRUE(same_bits(heights[k], expected[k]))
             << "zoom " << z << " post " << static_cast<std::int64_t>(k) % window.width_posts << ' '
             << static_cast<std::int64_t>(k) / window.width_posts << ": " << heights[k]
