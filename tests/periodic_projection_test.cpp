@@ -111,7 +111,7 @@ void expect_whole(const std::string& path, const Extent& extent, const TilingSch
 }
 
 TEST(PeriodicProjection, ARasterIsWholeWhereverItLiesAlongX) {
-  const unsigned seed = std::random_device()();
+  const unsigned seed = 20261129;
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 dice(seed);
   const std::vector<Extent> extents = {

@@ -31,7 +31,7 @@ struct SetPlan {
   TilingScheme scheme{Projection::kGeodetic};
   std::vector<TileKey> keys;      // sorted
   double root_tolerance_m = 200;  // halved at each zoom
-  double height_step_m = 0.25;
+  double height_step_m = 0.75;
   HeightSource heights;
   std::string recipe_json;
 };
