@@ -62,8 +62,9 @@ std::string progress_line(const PhaseState& state, std::int64_t columns) {
     }
     return line;
   }
-  for (const std::string& shorter : {numbers + time, state.phase + ": " + percent + time,
-                                     state.phase + " " + percent, percent}) {
+  for (const std::string& shorter :
+       {numbers + time, fmt::format("{}: {}{}", state.phase, percent, time),
+        fmt::format("{} {}", state.phase, percent), percent}) {
     if (columns_of(shorter) <= columns) return shorter;
   }
   return cut_to_columns(percent, columns);
