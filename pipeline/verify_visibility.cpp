@@ -17,6 +17,7 @@ constexpr std::array<double, 5> kHeightsAboveM = {50, 3e3, 1e5, 2e6, 3e7};
 // Cameras over a tile stand in the middle of so many rows and columns of it.
 constexpr int kRowsOfCameras = 5;
 constexpr double kCameraStepDeg = 30;
+constexpr int kParallelsOfCameras = 6;
 // Peaks on a rim are seen from this much farther beyond it than the rim itself.
 constexpr double kBeyondHorizonDeg = 0.3;
 
@@ -95,9 +96,9 @@ std::vector<GeoPoint> cameras_around(const RectangleDeg& rectangle, double highe
     }
   }
   if (width_deg <= kWideDeg) return cameras;
-  for (double latitude_deg = -75; latitude_deg <= 75; latitude_deg += kCameraStepDeg) {
-    for (double from_deg = 0; from_deg < 360; from_deg += kCameraStepDeg) {
-      add(rectangle.west_deg + from_deg, latitude_deg);
+  for (int j = 0; j < kParallelsOfCameras; ++j) {
+    for (int i = 0; i < 2 * kParallelsOfCameras; ++i) {
+      add(rectangle.west_deg + i * kCameraStepDeg, (j + 0.5) * kCameraStepDeg - 90);
     }
   }
   // Where the middles of the west and east sides are on the horizon.
