@@ -146,11 +146,10 @@ async function expectPainted(page, png) {
   assert(blue[2] > blue[0] + 30 && blue[2] > blue[1], `the sea is blue: ${blue}`);
   assert(ground[0] >= ground[2] && !isGrey(ground), `the land is not: ${ground}`);
   assert(isGrey(grey) && grey[0] > 15, `no colours beyond the data: ${grey}`);
-  // Across each side, some pixel is of the outline.
-  const height = { 175: -2000, 187: 1200 };
+  // Across each side, some pixel is of the outline, at whatever height the ground there has come to.
   for (const side of [175, 187]) {
-    const [[x, y]] = await inPicture(page, [[side, middle, height[side]]]);
-    const across = Array.from({ length: 41 }, (_, k) => [x - 20 + k, y]);
+    const places = await inPicture(page, [-2000, -1000, 0, 600, 1200].map((up) => [side, middle, up]));
+    const across = places.flatMap(([x, y]) => Array.from({ length: 61 }, (_, k) => [x - 30 + k, y]));
     const colours = await coloursAt(page, png, across);
     assert(colours.some(isOutline), `an outline at ${side} degrees: ${colours.join(' | ')}`);
   }
