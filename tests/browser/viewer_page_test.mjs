@@ -147,7 +147,7 @@ async function expectPainted(page, png) {
   assert(ground[0] >= ground[2] && !isGrey(ground), `the land is not: ${ground}`);
   assert(isGrey(grey) && grey[0] > 15, `no colours beyond the data: ${grey}`);
   // Across each side, some pixel is of the outline, at whatever height the ground there has come to.
-  for (const side of [175, 187]) {
+  for (const side of [174.375, 191.25]) {
     const places = await inPicture(page, [-2000, -1000, 0, 600, 1200].map((up) => [side, middle, up]));
     const across = places.flatMap(([x, y]) => Array.from({ length: 61 }, (_, k) => [x - 30 + k, y]));
     const colours = await coloursAt(page, png, across);
