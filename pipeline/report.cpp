@@ -91,7 +91,22 @@ std::string report_table(const BuildReport& report) {
                         zoom.tolerance_m ? fmt::format("{:.3f}", *zoom.tolerance_m) : "none",
                         zoom.error.largest_m, zoom.error.rms_m());
   }
-  return text;
+  double largest_m = 0;
+  for (const BuiltZoom& zoom : report.zooms) {
+    largest_m = std::max(largest_m, zoom.tolerance_m.value_or(0));
+  }
+  return text + coarse_zooms_text(largest_m);
+}
+
+std::string coarse_zooms_text(double largest_tolerance_m) {
+  constexpr double kToBeExplained_m = 1000;
+  if (largest_tolerance_m < kToBeExplained_m) return "";
+  return "Errors of kilometres at coarse zooms are meant: the tolerance halves with each zoom, "
+         "and\n"
+         "viewers show a coarse one only from where that is less than a pixel or two (CesiumJS "
+         "counts\n"
+         "with 77 km at zoom 0). For finer ones give --tolerance 1000, or --tolerance-at "
+         "0=500,1=500.\n";
 }
 
 std::string source_reads_text(const SourceReads& reads) {

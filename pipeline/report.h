@@ -53,6 +53,9 @@ struct BuildReport {
 // Times and memory of this run are in the report, and only there: it is no part of the tile set.
 std::string write_report(const BuildReport& report);
 std::string report_table(const BuildReport& report);
+// Why coarse zooms are as far off as the table says, where a zoom's tolerance is a kilometre or more;
+// else empty.
+std::string coarse_zooms_text(double largest_tolerance_m);
 // "1234 blocks, each decoded 1.02 times"
 std::string source_reads_text(const SourceReads& reads);
 

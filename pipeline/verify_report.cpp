@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "formats/printable.h"
+#include "pipeline/report.h"
 #include "pipeline/text_table.h"
 #include "pipeline/verify.h"
 
@@ -120,6 +121,11 @@ std::string text_of(const VerifyReport& report) {
   std::vector<TableRow> rows = {heading(report)};
   for (const ZoomReport& zoom : report.zooms) rows.push_back(row_of(report, zoom));
   std::string text = table_text(rows);
+  double largest_m = 0;
+  for (const ZoomReport& zoom : report.zooms) {
+    largest_m = std::max(largest_m, zoom.tolerance_m.value_or(0));
+  }
+  text += coarse_zooms_text(largest_m);
   text += findings_text(report, report.warnings, "warning");
   text += findings_text(report, report.faults, "fault");
   text += "verify: " + counted(report.tiles, "tile") + ", " + counted(report.fault_count, "fault");

@@ -87,7 +87,7 @@ Result<WebAddress> parse_web_address(std::string_view text) {
   const std::size_t query_at = rest.find('?');
   const std::size_t path_end = std::min(query_at, rest.size());
   address.path = rest.substr(authority_end, path_end - authority_end);
-  if (address.path.empty()) address.path = "/";
+  if (address.path.empty()) address.path.push_back('/');
   if (query_at != std::string::npos) address.query = rest.substr(query_at + 1);
   return address;
 }

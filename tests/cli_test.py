@@ -74,6 +74,11 @@ class Cli(unittest.TestCase):
         self.assertEqual(self.built.returncode, 0, self.built.stderr)
         self.assertIn("max error m", self.built.stdout)
         self.assertRegex(self.built.stdout, r"built: \d+ tiles")
+        why = "Errors of kilometres at coarse zooms are meant"
+        self.assertIn(why, self.built.stdout)
+        self.assertIn(why, run("verify", self.tiles, "--source", self.dem).stdout)
+        done = run("build", self.dem, "-o", self.root / "fine", "--tolerance", 900, "--max-zoom", 3)
+        self.assertNotIn(why, done.stdout)
 
     def test_silent_run_has_no_carriage_returns(self):
         self.assertNotIn("\r", self.built.stderr)

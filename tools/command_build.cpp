@@ -9,6 +9,7 @@
 
 #include "formats/printable.h"
 #include "pipeline/build.h"
+#include "tools/help_format.h"
 #include "tools/interrupt.h"
 #include "tools/method_arguments.h"
 #include "tools/parse_values.h"
@@ -115,8 +116,12 @@ int run_build(const BuildArguments& arguments) {
 
 void add_output_options(CLI::App& command, BuildArguments& arguments) {
   OutputOptions& output = arguments.output;
-  command.add_option("-o,--output", output.path, "Folder for the tiles, or OUT.mbtiles: one file")
+  begin_group(command, kRequiredGroup);
+  command
+      .add_option("-o,--output", output.path,
+                  "Folder for the tiles, or OUT.mbtiles: one file (not with --dry-run)")
       ->type_name("OUT");
+  begin_group(command, kOutputGroup);
   command.add_flag("--overwrite", arguments.overwrite,
                    "Replace an earlier tile set in OUT; start an unfinished one over");
   command
@@ -130,6 +135,7 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
   command.add_option("--description", output.description, "Description in layer.json");
   command.add_option("--attribution", output.attribution,
                      "Attribution in layer.json; viewers show it");
+  begin_group(command, kResourcesGroup);
   command
       .add_option(
           "--checkpoint", arguments.checkpoint_s,
@@ -146,6 +152,7 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
                    "Leave the run folder with its stores when the tiles are done");
   command.add_flag("--dry-run", arguments.dry_run,
                    "Stop after the estimate: tiles, size, time, memory");
+  begin_group(command, kMessagesGroup);
   command.add_flag("--json", arguments.json,
                    "Report as JSON on stdout, progress as JSON lines on stderr");
   command.add_flag("-v,--verbose", arguments.verbose,

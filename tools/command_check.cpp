@@ -6,6 +6,7 @@
 #include <string>
 
 #include "pipeline/check_url.h"
+#include "tools/help_format.h"
 #include "tools/http_client.h"
 #include "tools/interrupt.h"
 
@@ -61,10 +62,12 @@ void register_check(CLI::App& app, std::function<int()>& action) {
   CLI::App* command = app.add_subcommand(
       "check", "Look at a tile set on a web server as viewers would, and say what is wrong");
   command->footer(kFooter);
+  begin_group(*command, kInputGroup);
   command
       ->add_option("URL", arguments->address,
                    "Address of the tile set's folder, or of the layer.json in it")
       ->required();
+  begin_group(*command, kResourcesGroup);
   command->add_option("--tiles", arguments->options.most_tiles, "Tiles to ask for at most")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
@@ -73,11 +76,13 @@ void register_check(CLI::App& app, std::function<int()>& action) {
       ->type_name("SECONDS")
       ->check(CLI::Range(0.01, 3600.0))
       ->capture_default_str();
+  begin_group(*command, kInputGroup);
   command
       ->add_option("--origin", arguments->options.origin,
                    "Origin of the page that shows the tiles; what it may not load is a fault "
                    "(default: some other site, and then it is a warning)")
       ->type_name("ORIGIN");
+  begin_group(*command, kMessagesGroup);
   command->add_flag("--json", arguments->wants_json, "Write one JSON object instead of text");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_check(*arguments); }; });

@@ -16,6 +16,7 @@
 #include "pipeline/compare.h"
 #include "pipeline/compare_page.h"
 #include "pipeline/compare_tables.h"
+#include "tools/help_format.h"
 #include "tools/interrupt.h"
 #include "tools/parse_values.h"
 #include "tools/pyramid_arguments.h"
@@ -144,6 +145,7 @@ void register_compare(CLI::App& app, std::function<int()>& action) {
   CLI::App* command = app.add_subcommand(
       "compare", "Build with several simplification methods and report how they compare");
   add_pyramid_options(*command, arguments->pyramid);
+  begin_group(*command, kPapersGroup);
   command
       ->add_option("--methods", arguments->methods,
                    "Methods to compare, separated by commas; edge-collapse with :edges or "
@@ -159,11 +161,14 @@ void register_compare(CLI::App& app, std::function<int()>& action) {
       ->add_option("--params", arguments->parameter_file,
                    "JSON file of parameters, as in `qmpipe build`")
       ->type_name("FILE");
+  begin_group(*command, kRequiredGroup);
   command->add_option("-o,--output", arguments->report, "Folder for the report")
       ->type_name("REPORT");
+  begin_group(*command, kOutputGroup);
   command->add_flag("--overwrite", arguments->overwrite, "Replace an earlier report in REPORT");
   command->add_flag("--keep-tiles", arguments->keep_tiles,
                     "Leave the pyramids in REPORT/tiles, one folder for each method");
+  begin_group(*command, kMessagesGroup);
   command->add_flag("--json", arguments->json,
                     "All numbers as JSON on stdout, progress as JSON lines on stderr");
   command->footer(kFooter);

@@ -20,6 +20,7 @@
 #include "pipeline/convert.h"
 #include "pipeline/machine_share.h"
 #include "pipeline/progress.h"
+#include "tools/help_format.h"
 #include "tools/interrupt.h"
 #include "tools/parse_values.h"
 
@@ -154,6 +155,7 @@ void register_one(CLI::App& app, std::function<int()>& action, const char* name,
   arguments->threads = usable_threads();
   CLI::App* command = app.add_subcommand(name, description);
   command->footer(kFooter);
+  begin_group(*command, kOutputGroup);
   command
       ->add_option(
           "IN", arguments->input,
@@ -169,17 +171,21 @@ void register_one(CLI::App& app, std::function<int()>& action, const char* name,
                    "Compression of the tiles: keep, none, or a level from 1 (fast) to 12 (small)")
       ->type_name("HOW")
       ->capture_default_str();
+  begin_group(*command, kInputGroup);
   command
       ->add_option("--rows", arguments->rows,
                    "How an .mbtiles input counts its rows: tms (from the south, as the "
                    "specification says; default) or xyz (from the north, as kalisio/k2 does)")
       ->check(CLI::IsMember({"tms", "xyz"}));
+  begin_group(*command, kOutputGroup);
   command->add_flag("--overwrite", arguments->overwrite,
                     "Replace an existing file, or the tile set in a folder");
+  begin_group(*command, kResourcesGroup);
   command
       ->add_option("--threads", arguments->threads, "Threads; the output does not depend on them")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  begin_group(*command, kMessagesGroup);
   command->add_flag("--json", arguments->wants_json, "Write one JSON object instead of a line");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_convert(*arguments); }; });

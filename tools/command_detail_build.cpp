@@ -16,6 +16,7 @@
 #include "pipeline/process_memory.h"
 #include "tools/detail_commands.h"
 #include "tools/height_arguments.h"
+#include "tools/help_format.h"
 #include "tools/interrupt.h"
 #include "tools/number_options.h"
 
@@ -130,6 +131,7 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
   CLI::App* command =
       detail.add_subcommand("build", "Turn points or a DEM into a detail-increment model");
   command->footer(kFooter);
+  begin_group(*command, kPapersGroup);
   command
       ->add_option(
           "INPUT", options.input,
@@ -154,12 +156,14 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
                    "Levels that an increment is merged over (detail info --increments)")
       ->capture_default_str()
       ->type_name("K");
+  begin_group(*command, kQualityGroup);
   command
       ->add_option(
           "--height-step", options.height_step_m,
           "Heights are rounded to multiples of it, metres (default: 1 where all heights are "
           "whole metres, else 0.01)")
       ->type_name("M");
+  begin_group(*command, kInputGroup);
   command
       ->add_option("--class", arguments->classes,
                    "Classes of a LAS file to keep: ground, or numbers between commas (default: all "
@@ -184,9 +188,11 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
       ->type_name("CRS");
   add_height_options(*command, arguments->heights);
   add_height_guard(*command, arguments->heights);
+  begin_group(*command, kResourcesGroup);
   command->add_option("--threads", options.threads, "Threads, each with a block of its own")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  begin_group(*command, kMessagesGroup);
   command->add_flag("--json", arguments->json, "Report as JSON");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_build(*arguments); }; });

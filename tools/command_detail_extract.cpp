@@ -13,6 +13,7 @@
 #include "formats/printable.h"
 #include "pipeline/detail_extract.h"
 #include "tools/detail_commands.h"
+#include "tools/help_format.h"
 #include "tools/number_options.h"
 #include "tools/parse_values.h"
 
@@ -139,6 +140,7 @@ int run_extract(const ExtractArguments& arguments) {
 }
 
 void add_choices(CLI::App& command, ExtractArguments& arguments) {
+  begin_group(command, kQualityGroup);
   command.add_option("--svo", arguments.svo_m, "Smallest visible object, metres")
       ->check(fault_of_negative)
       ->type_name("D");
@@ -161,6 +163,7 @@ void add_choices(CLI::App& command, ExtractArguments& arguments) {
 }  // namespace
 
 void add_view_options(CLI::App& command, DetailView& view) {
+  begin_group(command, kPapersGroup);
   command.add_option("--fov", view.fov_deg, "Vertical field of view, degrees")
       ->check(CLI::Range(0.1, 179.0))
       ->capture_default_str()
@@ -186,11 +189,13 @@ void register_detail_extract(CLI::App& detail, std::function<int()>& action) {
       ->required()
       ->type_name("MESH");
   add_choices(*command, *arguments);
+  begin_group(*command, kOutputGroup);
   command
       ->add_option("--frame", arguments->frame,
                    "local: metres from the mesh's middle; crs: the input's own x and y, in metres")
       ->check(CLI::IsMember({"local", "crs"}))
       ->capture_default_str();
+  begin_group(*command, kMessagesGroup);
   command->add_flag("--json", arguments->json, "Say what was chosen as JSON");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_extract(*arguments); }; });

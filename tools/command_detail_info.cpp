@@ -16,6 +16,7 @@
 #include "pipeline/detail_verify.h"
 #include "pipeline/machine_share.h"
 #include "tools/detail_commands.h"
+#include "tools/help_format.h"
 #include "tools/interrupt.h"
 
 namespace qmpipe {
@@ -165,9 +166,11 @@ void register_detail_verify(CLI::App& detail, std::function<int()>& action) {
       "Exit codes: 0 no fault, 1 the file cannot be read, 2 wrong usage, 3 faults, 130 "
       "interrupted.");
   command->add_option("FILE", arguments->path, "The model")->required();
+  begin_group(*command, kResourcesGroup);
   command->add_option("--threads", arguments->threads, "Threads, each with a block of its own")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  begin_group(*command, kMessagesGroup);
   command->add_flag("--json", arguments->json, "Report as JSON");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_verify(*arguments); }; });
@@ -183,6 +186,7 @@ void register_detail_info(CLI::App& detail, std::function<int()>& action) {
       "  qmpipe detail info terrain.h5 --json\n"
       "  qmpipe detail info terrain.h5 --chart terrain.html");
   command->add_option("FILE", arguments->path, "The model")->required();
+  begin_group(*command, kOutputGroup);
   command
       ->add_option(
           "--chart", arguments->chart,
@@ -190,6 +194,7 @@ void register_detail_info(CLI::App& detail, std::function<int()>& action) {
           "threshold")
       ->type_name("HTML");
   add_view_options(*command, arguments->view);
+  begin_group(*command, kMessagesGroup);
   command->add_flag(
       "--increments", arguments->increments,
       "Walk through the model and tell how many triangles change a level, one by one and "

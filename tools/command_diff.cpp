@@ -11,6 +11,7 @@
 #include "pipeline/diff_sets.h"
 #include "pipeline/machine_share.h"
 #include "pipeline/progress.h"
+#include "tools/help_format.h"
 #include "tools/interrupt.h"
 #include "tools/number_options.h"
 
@@ -65,9 +66,11 @@ void register_diff(CLI::App& app, std::function<int()>& action) {
   command->footer(kFooter);
   command->add_option("A", arguments->a, "A tile set")->required();
   command->add_option("B", arguments->b, "Another one")->required();
+  begin_group(*command, kResourcesGroup);
   command->add_option("--threads", options.threads, "Threads; the report does not depend on them")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  begin_group(*command, kMessagesGroup);
   command
       ->add_option("--max", options.most_listed,
                    "Tiles of each kind to show (different, only in A, only in B); all are counted")

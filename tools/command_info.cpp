@@ -9,6 +9,7 @@
 #include "formats/errors.h"
 #include "formats/tile_path.h"
 #include "formats/tile_set.h"
+#include "tools/help_format.h"
 #include "tools/info_report.h"
 
 namespace qmpipe {
@@ -81,8 +82,10 @@ void register_info(CLI::App& app, std::function<int()>& action) {
                    "Folder of a tile set, its layer.json, an .mbtiles file, or a tile")
       ->required()
       ->type_name("OUT|TILE");
+  begin_group(*command, kMessagesGroup);
   CLI::Option* json =
       command->add_flag("--json", arguments->wants_json, "Print JSON instead of text");
+  begin_group(*command, kOutputGroup);
   CLI::Option* mesh =
       command
           ->add_option("--mesh", arguments->mesh_path,
@@ -97,6 +100,7 @@ void register_info(CLI::App& app, std::function<int()>& action) {
           "(east, north, up) or ecef (earth-centred axes). DEFAULT: enu")
       ->needs(mesh)
       ->check(CLI::IsMember({"enu", "ecef"}));
+  begin_group(*command, kInputGroup);
   command
       ->add_option(
           "--key", arguments->key,

@@ -19,6 +19,7 @@
 #include "formats/tile_set.h"
 #include "tools/detail_commands.h"
 #include "tools/detail_service.h"
+#include "tools/help_format.h"
 #include "tools/http_server.h"
 #include "tools/interrupt.h"
 #include "tools/page_files.h"
@@ -154,17 +155,20 @@ void register_serve(CLI::App& app, std::function<int()>& action) {
                    "The tile set: its folder, an .mbtiles or a .pmtiles file, ours or another "
                    "program's; or the file of a detail-increment model")
       ->required();
+  begin_group(*command, kOutputGroup);
   command->add_option("--port", arguments->listen.port, "Port; 0: any free one")
       ->check(CLI::Range(0, 65535))
       ->capture_default_str();
   command->add_option("--host", arguments->listen.host, "Address to listen on")
       ->type_name("ADDRESS")
       ->capture_default_str();
+  begin_group(*command, kResourcesGroup);
   command
       ->add_option("--threads", arguments->listen.threads,
                    "Connections served at a time; others wait")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  begin_group(*command, kMessagesGroup);
   command->add_flag("--json", arguments->wants_json,
                     "Say where it listens as a JSON object, on one line");
   command->callback(

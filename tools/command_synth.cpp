@@ -14,6 +14,7 @@
 #include "formats/errors.h"
 #include "formats/raster_writer.h"
 #include "stages/synth_terrain.h"
+#include "tools/help_format.h"
 
 namespace qmpipe {
 namespace {
@@ -149,6 +150,7 @@ void register_synth(CLI::App& app, std::function<int()>& action) {
   const auto options = std::make_shared<SynthOptions>();
   CLI::App* const command =
       app.add_subcommand("synth", "Write a made-up DEM of any size (GeoTIFF, EPSG:4326, int16 m)");
+  begin_group(*command, kOutputGroup);
   command->add_option("-o,--output", options->output, "GeoTIFF to write")->required();
   command->add_option("--size", options->size, "Columns x rows, in pixels")->capture_default_str();
   command

@@ -16,6 +16,7 @@
 #include "pipeline/single_tin.h"
 #include "pipeline/stopwatch.h"
 #include "tools/height_arguments.h"
+#include "tools/help_format.h"
 #include "tools/method_arguments.h"
 #include "tools/parse_values.h"
 #include "tools/pyramid_arguments.h"
@@ -235,6 +236,7 @@ int run_tin(const TinArguments& arguments) {
 }
 
 void add_options(CLI::App& command, TinArguments& arguments) {
+  begin_group(command, kQualityGroup);
   command
       .add_option("INPUT", arguments.input,
                   "Raster of any GDAL format, 2 x 2 to 32768 x 32768 pixels; each pixel is a post")
@@ -255,12 +257,14 @@ void add_options(CLI::App& command, TinArguments& arguments) {
                   "At most so many triangles; for the point sets searched likewise")
       ->type_name("N");
   add_method_options(command, arguments.method);
+  begin_group(command, kOutputGroup);
   command
       .add_option("--frame", arguments.frame,
                   "local: metres east and north of the DEM's middle, heights up; crs: the "
                   "coordinates of the CRS, heights in metres (.ply and .obj only)")
       ->capture_default_str()
       ->check(CLI::IsMember({"local", "crs"}));
+  begin_group(command, kInputGroup);
   command
       .add_option("--source-crs", arguments.source_crs,
                   "CRS of the input, in place of its own (EPSG:32605, a .prj file, WKT). Without "
@@ -269,6 +273,7 @@ void add_options(CLI::App& command, TinArguments& arguments) {
   add_height_options(command, arguments.heights);
   add_height_guard(command, arguments.heights);
   add_memory_option(command, arguments.memory);
+  begin_group(command, kMessagesGroup);
   command.add_flag("--json", arguments.json, "Print the statistics as JSON");
   command.add_flag("-v,--verbose", arguments.verbose, "Print every effective option first");
   command.footer(kFooter);

@@ -12,6 +12,7 @@
 #include "pipeline/progress.h"
 #include "pipeline/verify.h"
 #include "tools/height_arguments.h"
+#include "tools/help_format.h"
 #include "tools/interrupt.h"
 #include "tools/number_options.h"
 
@@ -80,6 +81,7 @@ void register_verify(CLI::App& app, std::function<int()>& action) {
       "verify",
       "Check a finished tile set: tiles, cracks, layer.json, and heights against a source");
   command->footer(kFooter);
+  begin_group(*command, kInputGroup);
   command
       ->add_option("OUT", arguments->path,
                    "The tile set: its folder, the layer.json in it, or an .mbtiles file")
@@ -93,11 +95,14 @@ void register_verify(CLI::App& app, std::function<int()>& action) {
                    "Take this CRS instead of the one that the sources name (EPSG:n, WKT, PROJ)")
       ->type_name("CRS");
   add_height_options(*command, arguments->heights);
+  begin_group(*command, kPapersGroup);
   command->add_flag("--hausdorff", arguments->wants_hausdorff,
                     "Measure the symmetric Hausdorff distance too (needs --source)");
+  begin_group(*command, kResourcesGroup);
   command->add_option("--threads", options.threads, "Threads; the report does not depend on them")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
+  begin_group(*command, kMessagesGroup);
   command
       ->add_option("--max-faults", options.most_per_kind,
                    "Faults and warnings of each kind to show; all are counted")

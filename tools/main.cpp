@@ -28,6 +28,7 @@
 #include "tools/command_synth.h"
 #include "tools/command_tin.h"
 #include "tools/command_verify.h"
+#include "tools/help_format.h"
 #include "tools/number_options.h"
 #include "tools/printed_streams.h"
 
@@ -80,7 +81,14 @@ int run(int argc, char** argv) {
   app.name("qmpipe");
   app.set_version_flag("--version", std::string("qmpipe ") + qmpipe::kProgramVersion);
   app.require_subcommand(1);
-  app.footer("Try `qmpipe <command> --help` for a command's options, units and an example.");
+  app.footer(
+      "Examples:\n"
+      "  qmpipe build dem.tif -o tiles     the pyramid of a DEM, as a folder for any web server\n"
+      "  qmpipe serve tiles                look at it: http://127.0.0.1:8080/\n"
+      "  qmpipe verify tiles --source dem.tif\n"
+      "`qmpipe COMMAND --help` has a command's options, their units and defaults, and more "
+      "examples.");
+  qmpipe::set_help_format(app);
   std::function<int()> action;
   qmpipe::register_build(app, action);
   qmpipe::register_verify(app, action);

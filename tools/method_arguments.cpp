@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "formats/errors.h"
+#include "tools/help_format.h"
 #include "tools/parse_values.h"
 
 namespace qmpipe {
@@ -40,6 +41,7 @@ std::pair<std::string, ZoomSeries> parse_parameter(const std::string& text) {
 }
 
 void add_method_options(CLI::App& command, MethodArguments& arguments) {
+  begin_group(command, kPapersGroup);
   std::string names;
   for (const Method method : kMethods) names += (names.empty() ? "" : ", ") + name_of(method);
   command.add_option("--method", arguments.method, "How vertices are chosen: " + names)

@@ -4,12 +4,14 @@
 
 #include "formats/errors.h"
 #include "pipeline/machine_share.h"
+#include "tools/help_format.h"
 #include "tools/parse_values.h"
 
 namespace qmpipe {
 namespace {
 
 void add_input_options(CLI::App& command, PyramidArguments& arguments) {
+  begin_group(command, kInputGroup);
   command
       .add_option("INPUT", arguments.options.input.paths,
                   "Rasters of any GDAL format and CRS; where they overlap, the first that is valid "
@@ -21,6 +23,7 @@ void add_input_options(CLI::App& command, PyramidArguments& arguments) {
       ->type_name("CRS");
   add_height_options(command, arguments.heights);
   add_height_guard(command, arguments.heights);
+  begin_group(command, kQualityGroup);
   command
       .add_option("--resampling", arguments.resampling,
                   "How a post is read between pixels: bilinear, cubic or nearest")
@@ -31,6 +34,7 @@ void add_input_options(CLI::App& command, PyramidArguments& arguments) {
                   "How a coarser zoom is made: mean, subsample, max (shoal-biased) or min")
       ->capture_default_str()
       ->check(CLI::IsMember({"mean", "subsample", "max", "min"}));
+  begin_group(command, kInputGroup);
   command
       .add_option(
           "--nodata", arguments.voids,
@@ -43,11 +47,13 @@ void add_input_options(CLI::App& command, PyramidArguments& arguments) {
 
 void add_mesh_options(CLI::App& command, PyramidArguments& arguments) {
   MeshOptions& mesh = arguments.options.mesh;
+  begin_group(command, kOutputGroup);
   command
       .add_option("--scheme", arguments.scheme,
                   "Tiling scheme: geodetic (EPSG:4326) or mercator (EPSG:3857)")
       ->capture_default_str()
       ->check(CLI::IsMember({"geodetic", "mercator"}));
+  begin_group(command, kQualityGroup);
   command.add_option("--min-zoom", mesh.min_zoom, "Coarsest zoom (above 0: a set without roots)")
       ->capture_default_str();
   command.add_option(
@@ -56,21 +62,23 @@ void add_mesh_options(CLI::App& command, PyramidArguments& arguments) {
       "smaller one does not make a run read or keep less: posts are taken at the default and "
       "reduced");
   command
-      .add_option(
-          "--tolerance", arguments.tolerance_m,
-          "Largest vertical error at zoom 0 in metres; halved at each deeper zoom "
-          "[15000]. For greedy and for edge-collapse with --stop tolerance; with the others it "
-          "sets how fine heights are")
+      .add_option("--tolerance", arguments.tolerance_m,
+                  "Largest vertical error at zoom 0 in metres; halved at each deeper zoom "
+                  "(default: 15000). For greedy and for edge-collapse with --stop tolerance; with "
+                  "the others it "
+                  "sets how fine heights are")
       ->type_name("M");
   command
       .add_option("--tolerance-at", arguments.tolerances,
                   "Zooms with a tolerance of their own: zoom=metres, separated by commas")
       ->type_name("Z=M,...");
+  begin_group(command, kPapersGroup);
   command.add_option("--grid", arguments.grid_cells, "The same as --param g_g=N")->type_name("N");
 }
 
 void add_machine_options(CLI::App& command, PyramidArguments& arguments) {
   RunOptions& run = arguments.options.run;
+  begin_group(command, kResourcesGroup);
   run.threads = usable_threads();
   command.add_option("--threads", run.threads,
                      "Threads to work with (default: all processors that it may use)");
@@ -80,6 +88,7 @@ void add_machine_options(CLI::App& command, PyramidArguments& arguments) {
 }  // namespace
 
 void add_memory_option(CLI::App& command, std::string& size) {
+  begin_group(command, kResourcesGroup);
   command
       .add_option("--memory", size,
                   "Most memory for the whole process, such as 512M or 2G; 0: nine tenths of the "
