@@ -21,6 +21,7 @@ nlohmann::ordered_json zoom_object(const BuiltZoom& zoom) {
       {"parameters", zoom.parameters},
       {"valid_posts", zoom.error.posts},
       {"max_error_m", zoom.error.largest_m},
+      {"max_error_in_place_m", zoom.error.largest_in_place_m},
       {"mean_error_m", zoom.error.mean_m()},
       {"rms_error_m", zoom.error.rms_m()}};
   for (std::size_t k = 0; k < kStageCount; ++k) {

@@ -17,6 +17,7 @@ void visit_zoom(Zoom& zoom, const Visit& visit) {
   visit("stored_bytes", zoom.stored_bytes);
   visit("error_posts", zoom.error.posts);
   visit("error_largest_m", zoom.error.largest_m);
+  visit("error_largest_in_place_m", zoom.error.largest_in_place_m);
   visit("error_sum_m", zoom.error.sum_m);
   visit("error_sum_of_squares_m2", zoom.error.sum_of_squares_m2);
   visit("error_worst_i", zoom.error.worst.i);

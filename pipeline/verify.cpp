@@ -39,6 +39,7 @@ struct TileOutcome {
   std::optional<TileExtensions> extensions;  // none for a tile that cannot be read
   std::optional<TileBorders> borders;        // none where its heights are no numbers
   ErrorSummary error;
+  ErrorSummary source_error;
   std::optional<HausdorffDistances> hausdorff;
   double crack_m = 0;
   std::int64_t border_pairs = 0;
@@ -246,6 +247,7 @@ void Verification::measure(const QuantizedMesh& mesh, TileOutcome& outcome) cons
   const PostGrid grid = make_tile_grid(layer_.scheme, outcome.key);
   outcome.error = measure_error(grid, mesh, posts->heights_m, posts->valid);
   judge_error(outcome);
+  outcome.source_error = source_->own_error(outcome.key, mesh).value_or(ErrorSummary());
   const bool has_voids = std::count(posts->valid.begin(), posts->valid.end(), 0) > 0;
   if (has_voids) judge_outside(mesh, posts->valid, outcome);
   if (options_.hausdorff == HausdorffMode::kMeasured && !has_voids && mesh.triangle_count() > 0) {
@@ -336,6 +338,7 @@ void Verification::collect(TileOutcome& outcome, ZoomReport& zoom) {
   add_tile(layer_, outcome.key, *outcome.extensions, tallies_);
   if (outcome.error.largest_m > zoom.error.largest_m) zoom.worst_tile = outcome.key;
   zoom.error.add(outcome.error);
+  zoom.source_error.add(outcome.source_error);
   if (outcome.hausdorff) {
     zoom.measured.push_back({outcome.key, outcome.vertices, outcome.triangles, *outcome.hausdorff});
   }

@@ -58,6 +58,8 @@ struct ZoomReport {
   ErrorSummary error;  // its `worst` is of the tile worst_tile
   std::optional<TileKey> worst_tile;
   std::optional<double> tolerance_m;
+  // Against the source's own posts, where the set has a recipe.
+  ErrorSummary source_error;
   std::vector<MeasuredTile> measured;  // by HausdorffMode::kMeasured; by key
 
   double mean_vertices() const;

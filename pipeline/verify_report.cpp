@@ -19,7 +19,8 @@ using Json = nlohmann::ordered_json;
 TableRow heading(const VerifyReport& report) {
   TableRow row = {"zoom", "tiles", "V", "T", "bytes", "bytes/tile", "crack mm"};
   if (report.has_source) {
-    for (const char* name : {"max err m", "mean err m", "RMS err m", "tolerance m"}) {
+    for (const char* name : {"max err m", "mean err m", "RMS err m", "tolerance m", "in place m",
+                             "source max m", "source RMS m"}) {
       row.emplace_back(name);
     }
   }
@@ -48,6 +49,12 @@ TableRow row_of(const VerifyReport& report, const ZoomReport& zoom) {
       }
     }
     row.push_back(zoom.tolerance_m ? fmt::format("{:.6g}", *zoom.tolerance_m) : "-");
+    const auto cell = [](const ErrorSummary& error, double error_m) {
+      return error.posts == 0 ? "-" : fmt::format("{:.4g}", error_m);
+    };
+    row.push_back(cell(zoom.error, zoom.error.largest_in_place_m));
+    row.push_back(cell(zoom.source_error, zoom.source_error.largest_m));
+    row.push_back(cell(zoom.source_error, zoom.source_error.rms_m()));
   }
   if (report.hausdorff == HausdorffMode::kMeasured) {
     const HausdorffDistances mean = zoom.mean_hausdorff();
@@ -94,6 +101,12 @@ Json json_of_zoom(const VerifyReport& report, const ZoomReport& zoom) {
     json["mean_error_m"] = zoom.error.mean_m();
     json["rms_error_m"] = zoom.error.rms_m();
     json["worst_tile"] = zoom.worst_tile ? Json(to_string(*zoom.worst_tile)) : Json(nullptr);
+    json["max_error_in_place_m"] = zoom.error.largest_in_place_m;
+    const ErrorSummary& own = zoom.source_error;
+    json["source_posts"] = own.posts;
+    json["max_source_error_m"] = own.posts > 0 ? Json(own.largest_m) : Json(nullptr);
+    json["mean_source_error_m"] = own.posts > 0 ? Json(own.mean_m()) : Json(nullptr);
+    json["rms_source_error_m"] = own.posts > 0 ? Json(own.rms_m()) : Json(nullptr);
     json["tolerance_m"] = zoom.tolerance_m ? Json(*zoom.tolerance_m) : Json(nullptr);
   }
   if (report.hausdorff == HausdorffMode::kMeasured) {

@@ -2,18 +2,22 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "formats/lattice_window.h"
 #include "formats/raster_source.h"
 #include "pipeline/build_plan.h"
+#include "pipeline/block_cover.h"
 #include "pipeline/estimate.h"
 #include "pipeline/memory_share.h"
 #include "pipeline/scratch_folder.h"
 #include "pipeline/survey.h"
 #include "stages/height_step.h"
+#include "stages/finer_error.h"
 #include "stages/sampling.h"
 
 namespace qmpipe {
@@ -26,7 +30,12 @@ class SurveyedPosts final : public SourcePosts {
       : scratch_(std::move(scratch)),
         recipe_(std::move(recipe)),
         survey_(std::move(survey)),
-        heightfield_(*survey_.store, survey_.scheme, recipe_.voids, survey_.pole_heights) {}
+        heightfield_(*survey_.store, survey_.scheme, recipe_.voids, survey_.pole_heights),
+        own_blocks_(covered_blocks(survey_.scheme, survey_.sampling_zoom, survey_.sources)) {
+    std::erase_if(own_blocks_, [this](const BlockKey& block) {
+      return !survey_.store->has_block(block.zoom, block.x, block.y);
+    });
+  }
 
   std::optional<WindowHeights> posts(const TileKey& key) const override {
     if (key.zoom > survey_.sampling_zoom) return std::nullopt;
@@ -56,6 +65,23 @@ class SurveyedPosts final : public SourcePosts {
     }
     return heights ? heights->range_m() : 0;
   }
+  std::optional<ErrorSummary> own_error(const TileKey& key,
+                                        const QuantizedMesh& mesh) const override {
+    if (key.zoom > survey_.sampling_zoom) return std::nullopt;
+    const TileSurface surface(survey_.scheme, key, mesh);
+    const Lattice lattice(survey_.scheme, survey_.sampling_zoom);
+    const std::vector<BlockKey> blocks = own_blocks_in(key);
+    std::vector<ErrorSummary> parts(blocks.size());
+    // A coarse tile holds most of the source.
+    tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t k) {
+      std::vector<float> heights_m(kBlockSize);
+      survey_.store->read(lattice, posts_of(blocks[k]), heights_m);
+      parts[k] = surface.error(lattice.zoom(), posts_of(blocks[k]), heights_m);
+    });
+    ErrorSummary all;
+    for (const ErrorSummary& part : parts) all.add(part);
+    return all;
+  }
   std::vector<TileKey> expected_tiles() const override {
     std::vector<TileKey> keys;
     for (const std::vector<SurveyedTile>& zoom : survey_.tiles) {
@@ -69,10 +95,23 @@ class SurveyedPosts final : public SourcePosts {
   const std::vector<RasterInfo>& sources() const override { return survey_.sources; }
 
  private:
+  std::vector<BlockKey> own_blocks_in(const TileKey& key) const {
+    const std::int32_t levels = survey_.sampling_zoom - key.zoom;
+    // Rows first, as keys are sorted.
+    const TileKey first = {.zoom = survey_.sampling_zoom, .x = 0, .y = key.y << levels};
+    std::vector<BlockKey> blocks;
+    for (auto it = std::lower_bound(own_blocks_.begin(), own_blocks_.end(), first);
+         it != own_blocks_.end() && it->y >> levels == key.y; ++it) {
+      if (it->x >> levels == key.x) blocks.push_back(*it);
+    }
+    return blocks;
+  }
+
   std::unique_ptr<ScratchFolder> scratch_;
   Recipe recipe_;
   Survey survey_;
   Heightfield heightfield_;
+  std::vector<BlockKey> own_blocks_;  // of the sampling zoom, with data; sorted
 };
 
 class SampledPosts final : public SourcePosts {
@@ -98,6 +137,9 @@ class SampledPosts final : public SourcePosts {
   }
   std::optional<double> tolerance_m(std::int32_t) const override { return std::nullopt; }
   double relief_near_m(const TileKey& /*key*/) const override { return 0; }
+  std::optional<ErrorSummary> own_error(const TileKey&, const QuantizedMesh&) const override {
+    return std::nullopt;
+  }
   std::vector<TileKey> expected_tiles() const override { return {}; }
   const std::vector<RasterInfo>& sources() const override { return *sources_; }
 

@@ -18,6 +18,7 @@
 #include "pipeline/recipe.h"
 #include "scheduler/tiling_scheme.h"
 #include "stages/heightfield.h"
+#include "stages/tile_error.h"
 
 namespace qmpipe {
 
@@ -30,6 +31,11 @@ class SourcePosts {
   virtual std::optional<double> tolerance_m(std::int32_t zoom) const = 0;
   // The height range of the valid posts of a tile and of the eight around it; 0 without a recipe.
   virtual double relief_near_m(const TileKey& key) const = 0;
+  // How far the decoded tile is from the source's own posts: all of the sampling zoom that lie in it, no
+  // wider apart than pixels and averaged with nothing, voids left out. None without a recipe, and where
+  // posts() gives none.
+  virtual std::optional<ErrorSummary> own_error(const TileKey& key,
+                                                const QuantizedMesh& mesh) const = 0;
   // Tiles that the recipe asks for and the source has data for, sorted; empty without a recipe.
   virtual std::vector<TileKey> expected_tiles() const = 0;
   // What the inputs are, in order of priority.

@@ -78,8 +78,17 @@ std::vector<double> heights_at_posts(const PostGrid& grid, const Surface& surfac
 ErrorSummary measure(const PostGrid& grid, const Surface& surface, std::span<const float> heights_m,
                      std::span<const std::uint8_t> valid) {
   QMPIPE_CHECK(heights_m.size() == grid.post_count() && valid.size() == grid.post_count());
-  const std::vector<double> heights = heights_at_posts(grid, surface);
+  std::vector<double> heights = heights_at_posts(grid, surface);
   ErrorSummary summary;
+  for (std::size_t k = 0; k < heights.size(); ++k) {
+    if (valid[k] == 0 || std::isnan(heights[k])) continue;
+    const double error_m = std::abs(heights[k] - static_cast<double>(heights_m[k]));
+    summary.largest_in_place_m = std::max(summary.largest_in_place_m, error_m);
+  }
+  for (std::size_t k = 0; k < surface.posts.size(); ++k) {
+    if (surface.posts[k] == kNoPost) continue;
+    heights[static_cast<std::size_t>(surface.posts[k])] = surface.heights_m[k];
+  }
   for (std::size_t k = 0; k < heights.size(); ++k) {
     if (valid[k] == 0 || std::isnan(heights[k])) continue;
     const double error_m = std::abs(heights[k] - static_cast<double>(heights_m[k]));
@@ -102,6 +111,7 @@ void ErrorSummary::add(const ErrorSummary& other) {
     largest_m = other.largest_m;
     worst = other.worst;
   }
+  largest_in_place_m = std::max(largest_in_place_m, other.largest_in_place_m);
   posts += other.posts;
   sum_m += other.sum_m;
   sum_of_squares_m2 += other.sum_of_squares_m2;

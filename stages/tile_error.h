@@ -2,7 +2,9 @@
 // made from: the measure of DESIGN 4.3.
 //
 // A post that is a vertex is judged where the file puts the vertex (half a quantized unit from its
-// exact place at most); every other post at its exact place on the surface.
+// exact place at most); every other post at its exact place on the surface. That is what a tolerance
+// bounds. On slopes of more than a tolerance in half a unit, 1/65534 of the tile's side, the surface at
+// such a post's exact place may be farther off; largest_in_place_m counts that too.
 #pragma once
 
 #include <span>
@@ -15,7 +17,8 @@ namespace qmpipe {
 struct ErrorSummary {
   std::int64_t posts = 0;  // valid posts judged
   double largest_m = 0;
-  double sum_m = 0;  // of magnitudes
+  double largest_in_place_m = 0;  // of the surface at the exact place of every post
+  double sum_m = 0;               // of magnitudes
   double sum_of_squares_m2 = 0;
   Post worst;  // of the grid, where largest_m was found first (lowest index)
 

@@ -198,6 +198,7 @@ TEST(ReportState, GivesBackTheSumsToTheLastBit) {
     row.tiles = 17 + zoom;
     row.error.posts = 12345678901;
     row.error.largest_m = 1.0 / 3 + zoom;
+    row.error.largest_in_place_m = 2.0 / 3 + zoom;
     row.error.sum_m = 1e9 / 7;
     row.error.sum_of_squares_m2 = 2e-17;
     row.error.worst = {.i = 255, .j = zoom};
@@ -220,6 +221,7 @@ TEST(ReportState, GivesBackTheSumsToTheLastBit) {
   EXPECT_EQ(read->content_hash, report.content_hash);
   EXPECT_EQ(read->zooms[1].error.sum_of_squares_m2, 2e-17);
   EXPECT_EQ(read->zooms[2].error.largest_m, 1.0 / 3 + 4);
+  EXPECT_EQ(read->zooms[2].error.largest_in_place_m, 2.0 / 3 + 4);
 }
 
 TEST(ReportState, AForeignOneIsRefused) {

@@ -89,10 +89,9 @@ void try_triangle(const PostGrid& grid, const std::array<std::array<double, 2>, 
   for (auto j = static_cast<std::int32_t>(row - grid.v_exact.begin()); j < kTilePosts; ++j) {
     const double v = grid.v_exact[static_cast<std::size_t>(j)];
     if (v > north + 1e-6) break;
-    const auto first = static_cast<std::int32_t>(std::floor(west / 127.99609375 - 0.01));
-    for (std::int32_t i = std::max(0, first); i < kTilePosts; ++i) {
+    const auto column = std::lower_bound(grid.u_exact.begin(), grid.u_exact.end(), west - 1e-6);
+    for (auto i = static_cast<std::int32_t>(column - grid.u_exact.begin()); i < kTilePosts; ++i) {
       const double u = grid.u_exact[static_cast<std::size_t>(i)];
-      if (u < west - 1e-6) continue;
       if (u > east + 1e-6) break;
       const double a = cross_of(c[1], c[2], u, v) / area;
       const double b = cross_of(c[2], c[0], u, v) / area;

@@ -96,9 +96,54 @@ TEST_F(VerifySource, OnlyReportsAnotherProgramsErrors) {
   EXPECT_THAT(report.faults, IsEmpty()) << text_of(report);
   const ZoomReport& deepest = report.zooms.back();
   EXPECT_FALSE(deepest.tolerance_m.has_value());
+  EXPECT_EQ(deepest.source_error.posts, 0);
   // The deepest zoom of the build was reduced from a deeper one, so its posts are not the source's.
   EXPECT_GT(deepest.error.largest_m, 10);
   EXPECT_LT(deepest.error.largest_m, 300);
+}
+
+// The posts that a tile was made from are means; the source's own are farther off, and all of them count.
+TEST_F(VerifySource, MeasuresTheSourcesOwnPostsBeside) {
+  const VerifyReport report = set_.verify(with_source());
+  std::int64_t posts = 0;
+  for (const ZoomReport& zoom : report.zooms) {
+    SCOPED_TRACE(zoom.zoom);
+    EXPECT_GT(zoom.source_error.largest_m, 0);
+    EXPECT_LT(zoom.source_error.rms_m(), zoom.source_error.largest_m);
+    if (posts == 0) posts = zoom.source_error.posts;
+    EXPECT_EQ(zoom.source_error.posts, posts);
+  }
+  // The deepest zoom is the sampling zoom, whose posts on sides belong to two tiles.
+  const ZoomReport& deepest = report.zooms.back();
+  EXPECT_LT(posts, deepest.error.posts);
+  EXPECT_GT(posts, deepest.error.posts * 98 / 100);
+  EXPECT_NEAR(deepest.source_error.largest_m, deepest.error.largest_in_place_m, 1e-3);
+}
+
+TEST_F(VerifySource, ASpikeOfOnePixelShowsInTheSourcesErrorAlone) {
+  const std::string spiky = file_in(inputs_, "spiky.tif");
+  RasterFixture fixture;
+  fixture.width = 500;
+  fixture.height = 400;
+  fixture.geotransform = {{10, 0.01, 0, 50, 0, -0.01}};
+  fixture.value = [](int c, int r) { return c == 251 && r == 201 ? 5000.0 : 100.0; };
+  write_raster(spiky, fixture);
+  BuildOptions build;
+  build.input.paths = {spiky};
+  build.output.path = inputs_.path() / "spiky";
+  Progress progress(ProgressStyle::kSilent, nullptr);
+  build_pyramid(build, progress);
+  const VerifyReport report =
+      verify(*open_tile_set(build.output.path), {.sources = {spiky}}, progress);
+  EXPECT_THAT(report.faults, IsEmpty()) << text_of(report);
+  const ZoomReport& deepest = report.zooms.back();
+  EXPECT_LE(deepest.source_error.largest_m, *deepest.tolerance_m + 40);
+  for (const ZoomReport& zoom : report.zooms) {
+    if (zoom.zoom > deepest.zoom - 3) continue;
+    // Its post there is a mean over 64 or more of which one or two stand out.
+    EXPECT_GT(zoom.source_error.largest_m, 3000) << zoom.zoom;
+    EXPECT_LE(zoom.error.largest_m, *zoom.tolerance_m);
+  }
 }
 
 TEST_F(VerifySource, MeasuresHausdorffOfTilesWithoutVoids) {
