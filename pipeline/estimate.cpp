@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::int64_t kTilesPerSample = 8;
 // More of them would make a small set's estimate take as long as the set.
-constexpr std::int64_t kFewest = 10;
+constexpr std::int64_t kFewest = 16;
 constexpr std::int64_t kMost = 64;
 // Of a tile that is flat, beside one whose range is the tolerance.
 constexpr double kLeastWeight = 0.05;

@@ -31,7 +31,7 @@ struct Estimate {
   std::int32_t sampling_zoom = 0;
 };
 
-// Meshes 10 to 64 tiles, or all where they are fewer, without their neighbours' borders, on the run's
+// Meshes 16 to 64 tiles, or all where they are fewer, without their neighbours' borders, on the run's
 // threads. Tiles are drawn in proportion to what their ranges and valid posts let expect of them, and
 // count by what they turn out to be: bytes come out within a fifth for nine of ten real DEMs, whatever
 // flat or empty tiles stand among the rugged ones.

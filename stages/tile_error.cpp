@@ -68,11 +68,15 @@ std::vector<double> heights_at_posts(const PostGrid& grid, const Surface& surfac
                     }
                   });
   }
+  return heights;
+}
+
+// A post that is a vertex counts where the file puts that: places are rounded to the tile's 32,768.
+void put_vertices(const Surface& surface, std::vector<double>& heights) {
   for (std::size_t k = 0; k < surface.posts.size(); ++k) {
     if (surface.posts[k] == kNoPost) continue;
     heights[static_cast<std::size_t>(surface.posts[k])] = surface.heights_m[k];
   }
-  return heights;
 }
 
 ErrorSummary measure(const PostGrid& grid, const Surface& surface, std::span<const float> heights_m,
@@ -85,10 +89,7 @@ ErrorSummary measure(const PostGrid& grid, const Surface& surface, std::span<con
     const double error_m = std::abs(heights[k] - static_cast<double>(heights_m[k]));
     summary.largest_in_place_m = std::max(summary.largest_in_place_m, error_m);
   }
-  for (std::size_t k = 0; k < surface.posts.size(); ++k) {
-    if (surface.posts[k] == kNoPost) continue;
-    heights[static_cast<std::size_t>(surface.posts[k])] = surface.heights_m[k];
-  }
+  put_vertices(surface, heights);
   for (std::size_t k = 0; k < heights.size(); ++k) {
     if (valid[k] == 0 || std::isnan(heights[k])) continue;
     const double error_m = std::abs(heights[k] - static_cast<double>(heights_m[k]));
@@ -123,7 +124,10 @@ double ErrorSummary::rms_m() const {
 }
 
 std::vector<double> surface_at_posts(const PostGrid& grid, const QuantizedMesh& mesh) {
-  return heights_at_posts(grid, surface_of(grid, mesh));
+  const Surface surface = surface_of(grid, mesh);
+  std::vector<double> heights = heights_at_posts(grid, surface);
+  put_vertices(surface, heights);
+  return heights;
 }
 
 ErrorSummary measure_error(const PostGrid& grid, const QuantizedMesh& mesh,

@@ -112,10 +112,12 @@ class JoinedGrids : public ::testing::Test {
 void JoinedGrids::expect_same_posts(const std::vector<std::string>& uncut,
                                     const std::vector<std::string>& cut) {
   const std::vector<RasterInfo> infos = joined(uncut);
-  const TilingScheme scheme(pick(0, 1) == 0 ? Projection::kGeodetic : Projection::kMercator);
+  const RectangleDeg& box = infos.front().bounds_deg;
+  // Mercator has no posts near a pole.
+  const bool geodetic = pick(0, 1) == 0 || box.north_deg < -80;
+  const TilingScheme scheme(geodetic ? Projection::kGeodetic : Projection::kMercator);
   const std::int32_t zoom = sampling_zoom_for(scheme, infos);
   ASSERT_EQ(sampling_zoom_for(scheme, joined(cut)), zoom);
-  const RectangleDeg& box = infos.front().bounds_deg;
   for (const std::int32_t z : {zoom, std::max(0, zoom - 2)}) {
     const Lattice lattice(scheme, z);
     const PostWindow window{
@@ -185,8 +187,9 @@ TEST_F(JoinedGrids, AnyCutOfARasterGivesItsPosts) {
       {"turned", "EPSG:32631", {600000, 80, 30, 5000000, 30, -80}}};
   for (std::size_t turn = 0; turn < 20; ++turn) {
     const Place& place = places[turn % places.size()];
-    RasterFixture whole =
-        rough_raster(dice_, static_cast<int>(pick(12, 90)), static_cast<int>(pick(12, 70)));
+    const auto width = static_cast<int>(pick(12, 90));
+    const auto height = static_cast<int>(pick(12, 70));
+    RasterFixture whole = rough_raster(dice_, width, height);
     whole.crs = place.crs;
     whole.geotransform = place.geotransform;
     const std::vector<std::string> files = cut_files(whole, pick(2, 12), place.may_turn);

@@ -151,7 +151,7 @@ TEST(TileError, OnSteepSlopesTheRoundingOfPlacesAddsToIt) {
     c.valid.push_back(1);
   }
   c.tin = strip_ordered(
-      greedy_insertion(c.grid, c.heights_m, {}, {.tolerance_m = 10, .height_step_m = 0.5}));
+      greedy_insertion(c.grid, c.heights_m, {}, {.tolerance_m = 10, .height_steps = 0.5}));
   c.mesh = quantize(c.grid, c.tin, 0.5);
   const ErrorSummary summary = measure_error(c.grid, c.mesh, c.heights_m, c.valid);
   EXPECT_LE(summary.largest_m, 10);

@@ -17,11 +17,11 @@ void add_height_options(CLI::App& command, HeightArguments& arguments) {
       .add_option(
           "--z-scale", arguments.z_scale,
           "Multiply heights, which are metres by then, after what the file says of scale, unit "
-          "and direction (0.3048: they were feet; -1: the other way up) [1]")
+          "and direction (0.3048: they were feet; -1: the other way up; default: 1)")
       ->type_name("F");
   command
       .add_option("--z-offset", arguments.z_offset_m,
-                  "Add metres to all heights, after --z-scale [0]")
+                  "Add metres to all heights, after --z-scale (default: 0)")
       ->type_name("M");
 }
 
