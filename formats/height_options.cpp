@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <string_view>
@@ -38,16 +40,28 @@ bool add_void(std::string_view text, VoidValues& voids) {
 HeightOptions HeightOptions::or_else(const HeightOptions& other) const {
   HeightOptions both = *this;
   if (!both.voids) both.voids = other.voids;
+  if (!both.band) both.band = other.band;
+  if (!both.encoding) both.encoding = other.encoding;
   if (!both.z_scale) both.z_scale = other.z_scale;
   if (!both.z_offset_m) both.z_offset_m = other.z_offset_m;
+  if (both.open_options.empty()) both.open_options = other.open_options;
+  if (both.config.empty()) both.config = other.config;
   return both;
 }
 
 std::string text_of(const HeightOptions& options) {
   std::vector<std::string> parts;
   if (options.voids) parts.push_back("--void " + text_of(*options.voids));
+  if (options.band) parts.push_back(fmt::format("--band {}", *options.band));
+  if (options.encoding) parts.push_back("--encoding " + name_of(*options.encoding));
   if (options.z_scale) parts.push_back(fmt::format("--z-scale {}", *options.z_scale));
   if (options.z_offset_m) parts.push_back(fmt::format("--z-offset {}", *options.z_offset_m));
+  for (const auto& [flag, list] :
+       {std::pair{"--oo ", &options.open_options}, std::pair{"--config ", &options.config}}) {
+    for (const std::string& option : *list) {
+      parts.push_back(flag + (is_secret(option) ? option_name(option) + "=..." : option));
+    }
+  }
   return fmt::format("{}", fmt::join(parts, " "));
 }
 
@@ -62,6 +76,12 @@ std::optional<Error> fault_of(const HeightOptions& options) {
   if (!(std::abs(options.z_offset_m.value_or(0)) <= kLargestOffsetM)) {
     return Error{fmt::format("--z-offset {}: give metres between -{:.0f} and {:.0f}",
                              *options.z_offset_m, kLargestOffsetM, kLargestOffsetM)};
+  }
+  if (options.band.value_or(1) < 1) {
+    return Error{fmt::format("--band {}: bands are counted from 1", *options.band)};
+  }
+  if (options.band && options.encoding) {
+    return Error{"--band and --encoding: three bands make an encoded height; give one of the two"};
   }
   return std::nullopt;
 }
@@ -88,6 +108,31 @@ Result<VoidValues> void_values_named(const std::string& text) {
     if (comma == std::string_view::npos) return voids;
     rest.remove_prefix(comma + 1);
   }
+}
+
+std::string name_of(HeightEncoding encoding) {
+  return encoding == HeightEncoding::kTerrainRgb ? "terrain-rgb" : "terrarium";
+}
+
+Result<HeightEncoding> height_encoding_named(const std::string& name) {
+  for (const HeightEncoding encoding : {HeightEncoding::kTerrainRgb, HeightEncoding::kTerrarium}) {
+    if (name == name_of(encoding)) return encoding;
+  }
+  return Error{
+      fmt::format("\"{}\" is no encoding of heights; choose terrain-rgb or terrarium", name)};
+}
+
+std::string option_name(const std::string& option) { return option.substr(0, option.find('=')); }
+
+bool is_secret(const std::string& option) {
+  static constexpr std::array<const char*, 14> kWords = {
+      "KEY", "SECRET",    "TOKEN",      "PASS", "PWD",        "AUTH",   "COOKIE",
+      "SAS", "SIGNATURE", "CREDENTIAL", "USER", "CONNECTION", "HEADER", "ACCOUNT"};
+  std::string name = option_name(option);
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return std::any_of(kWords.begin(), kWords.end(),
+                     [&name](const char* word) { return name.find(word) != std::string::npos; });
 }
 
 }  // namespace qmpipe

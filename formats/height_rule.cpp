@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 #include <gdal_priv.h>
 
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <optional>
 
+#include "formats/height_claim.h"
 #include "formats/height_unit.h"
 
 namespace qmpipe {
@@ -76,27 +75,24 @@ void take_unit(GDALRasterBand& band, const RasterCrs& crs, RuledHeights& heights
     heights.assumptions.push_back("the unit of height '" + heights.unit +
                                   "' is unknown; metres are taken");
   }
-  if (heights.unit.empty()) heights.unit = "m";
-}
-
-std::string lower(const char* text) {
-  std::string letters = text != nullptr ? text : "";
-  std::transform(letters.begin(), letters.end(), letters.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return letters;
-}
-
-// CF's standard names that count downwards: "depth", "sea_floor_depth_below_geoid" and their like.
-bool is_depth_name(const std::string& standard_name) {
-  return standard_name == "depth" || standard_name.starts_with("depth_below_") ||
-         standard_name.find("_depth_below_") != std::string::npos;
+  if (!heights.unit.empty()) return;
+  heights.unit = "m";
+  if (crs.is_geographic || crs.metres_per_unit == 1) return;
+  heights.assumptions.push_back(fmt::format(
+      "x and y of its CRS are in units of {} m, and nothing names the unit of heights: metres are "
+      "taken; if they are in the same unit: --z-scale {}",
+      crs.metres_per_unit, crs.metres_per_unit));
 }
 
 // What says that the numbers are depths; empty: nothing does.
 std::string reason_for_depths(GDALRasterBand& band, const std::string& driver,
                               const RasterCrs& crs) {
-  const std::string positive = lower(band.GetMetadataItem("positive"));
-  const std::string name = lower(band.GetMetadataItem("standard_name"));
+  const auto item = [&band](const char* name) {
+    const char* const text = band.GetMetadataItem(name);
+    return lower_case(text != nullptr ? text : "");
+  };
+  const std::string positive = item("positive");
+  const std::string name = item("standard_name");
   if (positive == "down") return "its attribute 'positive' is 'down'";
   if (positive == "up") return "";
   if (is_depth_name(name)) return "its standard_name is '" + name + "'";

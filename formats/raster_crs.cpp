@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "formats/errors.h"
+#include "formats/raster_dataset.h"
 
 namespace qmpipe {
 namespace {
@@ -78,11 +79,27 @@ std::optional<fs::path> prj_beside(const std::string& path, const std::string& o
   return std::nullopt;
 }
 
+// Why a CRS cannot place a raster, whatever the place; none where it may.
+std::optional<std::string> fault_of_crs(const OGRSpatialReference& crs) {
+  const std::string name = crs.GetName() != nullptr ? crs.GetName() : "unnamed";
+  if (crs.IsVertical() != 0 && crs.IsCompound() == 0) {
+    return "'" + name + "' is a CRS of heights alone, which says nothing about x and y";
+  }
+  if (crs.IsGeocentric() != 0) {
+    return "'" + name + "' counts from the centre of the Earth, and a raster lies on its surface";
+  }
+  return std::nullopt;
+}
+
 OGRSpatialReference crs_from_text(const std::string& text) {
   OGRSpatialReference crs;
   if (crs.SetFromUserInput(text.c_str()) != OGRERR_NONE) {
     throw UsageError("--source-crs " + text +
                      " is not a CRS; write EPSG:n, a PROJ string, WKT, or the path of a .prj file");
+  }
+  if (const auto fault = fault_of_crs(crs)) {
+    throw UsageError("--source-crs " + text + ": " + *fault +
+                     "; name the one of x and y, or both: --source-crs EPSG:4326+5773");
   }
   return crs;
 }
@@ -106,12 +123,14 @@ OGRSpatialReference find_crs(GDALDataset& dataset, const std::string& path,
     crs = crs_from_text(override_text);
   } else if (const OGRSpatialReference* own = dataset.GetSpatialRef();
              own != nullptr && !own->IsEmpty()) {
+    if (const auto fault = fault_of_crs(*own)) {
+      throw IoError("cannot place the raster", path, "its CRS " + *fault, kNoCrsRemedy);
+    }
     return *own;
   } else if (const std::optional<fs::path> prj = prj_beside(path, opened)) {
     crs = crs_from_prj(*prj);
     assumptions.push_back("the file names no CRS; the one in " + prj->string() + " is taken");
-  } else if (std::string(dataset.GetDriver()->GetDescription()) == "netCDF" &&
-             has_degree_axes(dataset) && extent_looks_like_degrees(dataset)) {
+  } else if (is_netcdf(dataset) && has_degree_axes(dataset) && extent_looks_like_degrees(dataset)) {
     crs.importFromEPSG(4326);
     assumptions.emplace_back(
         "the file names no CRS; its axes are longitude and latitude, so EPSG:4326"
@@ -157,6 +176,9 @@ RasterCrs crs_of(GDALDataset& dataset, const std::string& path, const std::strin
   crs.StripVertical();
   if (crs.GetAxesCount() == 3) crs.DemoteTo2D(nullptr);
   result.is_geographic = crs.IsGeographic() != 0;
+  OGRErr has_no_radius = OGRERR_NONE;
+  const double radius_m = crs.GetSemiMajor(&has_no_radius);
+  if (has_no_radius == OGRERR_NONE) result.radius_m = radius_m;
   if (result.is_geographic) {
     const double turn =
         2 * std::numbers::pi / crs.GetAngularUnits(static_cast<const char**>(nullptr));

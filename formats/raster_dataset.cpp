@@ -9,9 +9,13 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
+#include <optional>
+#include <utility>
 
 #include "formats/errors.h"
 #include "formats/gdal_session.h"
+#include "formats/height_claim.h"
+#include "formats/height_options.h"
 
 namespace qmpipe {
 namespace {
@@ -20,9 +24,11 @@ using Dataset = std::unique_ptr<GDALDataset, CloseDataset>;
 
 constexpr unsigned kOpenFlags = GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERBOSE_ERROR;
 
-Dataset try_open(const std::string& name) {
-  return Dataset(
-      GDALDataset::FromHandle(GDALOpenEx(name.c_str(), kOpenFlags, nullptr, nullptr, nullptr)));
+Dataset try_open(const std::string& name, const std::vector<std::string>& open_options) {
+  CPLStringList options;
+  for (const std::string& option : open_options) options.AddString(option.c_str());
+  return Dataset(GDALDataset::FromHandle(
+      GDALOpenEx(name.c_str(), kOpenFlags, nullptr, options.List(), nullptr)));
 }
 
 std::string lower_extension(const std::string& path) {
@@ -55,7 +61,8 @@ void require_no_stream(const std::string& path) {
                 "Write it to a file first: cat PIPE > dem.tif");
 }
 
-OpenedRaster open_in_archive(const std::string& path) {
+OpenedRaster open_in_archive(const std::string& path,
+                             const std::vector<std::string>& open_options) {
   GdalSession session;
   const std::string root = "/vsizip/" + path;
   const CPLStringList files(VSIReadDirRecursive(root.c_str()));
@@ -77,32 +84,118 @@ OpenedRaster open_in_archive(const std::string& path) {
                   "name the one that is meant: " +
                       (rasters.empty() ? root + "/NAME" : fmt::format("{}", rasters.front())));
   }
-  Dataset dataset = try_open(rasters.front());
+  Dataset dataset = try_open(rasters.front(), open_options);
   if (!dataset) {
     throw IoError("cannot open the raster", rasters.front(), session.cause("GDAL refused it"),
                   "check the file with: gdalinfo " + rasters.front());
   }
-  return {.dataset = std::move(dataset), .name = rasters.front(), .assumptions = {}};
+  OpenedRaster opened;
+  opened.dataset = std::move(dataset);
+  opened.name = rasters.front();
+  return opened;
 }
 
 // NetCDF and HDF5 files with several grids show no band of their own.
-OpenedRaster first_subdataset(OpenedRaster container, const std::string& path) {
+OpenedRaster subdataset_of(const OpenedRaster& container, const std::string& path,
+                           const std::vector<std::string>& open_options) {
+  constexpr int kMostOpened = 100;
   GdalSession session;
   const CPLStringList list(CSLDuplicate(container.dataset->GetMetadata("SUBDATASETS")));
-  for (int k = 1; list.FetchNameValue(fmt::format("SUBDATASET_{}_NAME", k).c_str()); ++k) {
-    const std::string name = list.FetchNameValue(fmt::format("SUBDATASET_{}_NAME", k).c_str());
-    Dataset dataset = try_open(name);
+  OpenedRaster best;
+  HeightClaim claim;
+  std::vector<std::string> names;
+  for (int k = 1; k <= kMostOpened; ++k) {
+    const char* const name = list.FetchNameValue(fmt::format("SUBDATASET_{}_NAME", k).c_str());
+    if (name == nullptr) break;
+    Dataset dataset = try_open(name, open_options);
     if (!dataset || dataset->GetRasterCount() == 0) continue;
     if (dataset->GetRasterXSize() <= 1 || dataset->GetRasterYSize() <= 1) continue;
-    OpenedRaster opened{.dataset = std::move(dataset), .name = name, .assumptions = {}};
-    if (list.Count() > 2) {
-      opened.assumptions.push_back(
-          fmt::format("the file holds {} grids; {} is taken", list.Count() / 2, name));
-    }
-    return opened;
+    names.emplace_back(name);
+    const HeightClaim its = height_claim_of(*dataset->GetRasterBand(1), name);
+    if (best.dataset && its.weight <= claim.weight) continue;
+    claim = its;
+    best.dataset = std::move(dataset);
+    best.name = name;
   }
-  throw IoError("cannot read heights from", path, "it holds no raster band",
-                "list what it holds with: gdalinfo " + path);
+  if (!best.dataset) {
+    throw IoError("cannot read heights from", path, "it holds no raster band",
+                  "list what it holds with: gdalinfo " + path);
+  }
+  if (names.size() > 1) {
+    const std::string& other = names[names.front() == best.name ? 1 : 0];
+    best.assumptions.push_back(fmt::format(
+        "the file holds {} grids; {} is taken{}; to take another, name it as the input, such as "
+        "'{}'",
+        names.size(), best.name, claim.reason.empty() ? "" : ", since " + claim.reason, other));
+  }
+  return best;
+}
+
+// The file and the variable of a NetCDF raster.
+struct NetcdfVariable {
+  std::string file;
+  std::string name;
+};
+
+std::optional<NetcdfVariable> variable_of(GDALDataset& dataset, const std::string& name) {
+  const char* const variable = dataset.GetRasterBand(1)->GetMetadataItem("NETCDF_VARNAME");
+  if (variable == nullptr) return std::nullopt;
+  // NETCDF:"a.nc":variable, or the path.
+  const std::size_t first = name.find('"');
+  const std::size_t last = name.rfind('"');
+  const bool is_quoted = name.starts_with("NETCDF:") && first != last;
+  return NetcdfVariable{is_quoted ? name.substr(first + 1, last - first - 1) : name, variable};
+}
+
+// Where GDAL's classic driver finds no place, for axes that no CRS explains, it also turns rows round
+// by a guess. Read by its axes, an array lies as they say.
+void place_by_axes(OpenedRaster& opened) {
+  const auto variable = variable_of(*opened.dataset, opened.name);
+  if (!variable) return;
+  const Dataset file(GDALDataset::FromHandle(GDALOpenEx(variable->file.c_str(),
+                                                        GDAL_OF_MULTIDIM_RASTER | GDAL_OF_READONLY,
+                                                        nullptr, nullptr, nullptr)));
+  const auto root = file ? file->GetRootGroup() : nullptr;
+  if (!root) return;
+  const std::string full_name =
+      variable->name.starts_with('/') ? variable->name : "/" + variable->name;
+  const auto array = root->OpenMDArrayFromFullname(full_name);
+  if (!array || array->GetDimensionCount() != 2) return;
+  Dataset placed(array->AsClassicDataset(1, 0));
+  if (!placed || placed->GetRasterCount() != 1 || !has_geotransform(*placed)) return;
+  opened.dataset = std::move(placed);
+}
+
+void note_open_options(const std::vector<std::string>& open_options, OpenedRaster& opened) {
+  GDALDriver* const driver = opened.dataset->GetDriver();
+  if (driver == nullptr) return;
+  const char* const list = driver->GetMetadataItem(GDAL_DMD_OPENOPTIONLIST);
+  const std::string known = list != nullptr ? list : "";
+  for (const std::string& option : open_options) {
+    const std::string name = option_name(option);
+    if (known.find("name='" + name + "'") != std::string::npos ||
+        known.find("name=\"" + name + "\"") != std::string::npos) {
+      continue;
+    }
+    opened.assumptions.push_back(fmt::format(
+        "its driver {} knows no open option {}, which is ignored", opened.driver, name));
+  }
+}
+
+// A BAG of variable resolution opens as the coarse grid that all have.
+void note_finer_grid(const std::vector<std::string>& open_options, OpenedRaster& opened) {
+  const char* const finer = opened.dataset->GetMetadataItem("HAS_SUPERGRIDS");
+  if (finer == nullptr || std::string(finer) != "TRUE") return;
+  if (std::any_of(open_options.begin(), open_options.end(),
+                  [](const std::string& option) { return option_name(option) == "MODE"; })) {
+    return;
+  }
+  const char* const cell = opened.dataset->GetMetadataItem("MIN_RESOLUTION_X");
+  opened.assumptions.push_back(
+      fmt::format("it has grids of finer resolution, and the coarse one is taken; for cells of {} "
+                  "m, the finest: "
+                  "--oo MODE=RESAMPLED_GRID (for others: --oo RESX=M --oo RESY=M too)",
+                  cell != nullptr ? cell : "less"));
 }
 
 }  // namespace
@@ -112,13 +205,28 @@ void CloseDataset::operator()(GDALDataset* dataset) const {
   GDALClose(GDALDataset::ToHandle(dataset));
 }
 
-OpenedRaster open_dataset(const std::string& path) {
+bool is_netcdf(GDALDataset& dataset) {
+  GDALDriver* const driver = dataset.GetDriver();
+  return driver != nullptr && std::string(driver->GetDescription()) == "netCDF";
+}
+
+bool has_geotransform(GDALDataset& dataset) {
+  std::array<double, 6> g{};
+  return dataset.GetGeoTransform(g.data()) == CE_None &&
+         g != std::array<double, 6>{0, 1, 0, 0, 0, 1};
+}
+
+OpenedRaster open_dataset(const std::string& path, const std::vector<std::string>& open_options) {
   require_no_stream(path);
   GdalSession session;
-  OpenedRaster opened{.dataset = try_open(path), .name = path, .assumptions = {}};
+  OpenedRaster opened;
+  opened.dataset = try_open(path, open_options);
+  opened.name = path;
   VSIStatBufL status;
   const bool exists = VSIStatL(path.c_str(), &status) == 0;
-  if (!opened.dataset && exists && lower_extension(path) == ".zip") opened = open_in_archive(path);
+  if (!opened.dataset && exists && lower_extension(path) == ".zip") {
+    opened = open_in_archive(path, open_options);
+  }
   if (!opened.dataset) {
     throw IoError("cannot open the raster", path, session.cause("GDAL refused it"),
                   exists
@@ -126,7 +234,18 @@ OpenedRaster open_dataset(const std::string& path) {
                         "lists what this GDAL knows"
                       : "check the path");
   }
-  if (opened.dataset->GetRasterCount() == 0) return first_subdataset(std::move(opened), path);
+  if (opened.dataset->GetRasterCount() == 0) opened = subdataset_of(opened, path, open_options);
+  if (const GDALDriver* driver = opened.dataset->GetDriver()) {
+    opened.driver = driver->GetDescription();
+  }
+  const CPLStringList files(opened.dataset->GetFileList());
+  for (int k = 0; k < files.size(); ++k) opened.files.emplace_back(files[k]);
+  note_open_options(open_options, opened);
+  note_finer_grid(open_options, opened);
+  if (is_netcdf(*opened.dataset) && !has_geotransform(*opened.dataset) &&
+      opened.dataset->GetGCPCount() == 0) {
+    place_by_axes(opened);
+  }
   return opened;
 }
 

@@ -17,10 +17,17 @@ struct CloseDataset {
 struct OpenedRaster {
   std::unique_ptr<GDALDataset, CloseDataset> dataset;  // has at least one band
   std::string name;  // what was opened in the end, e.g. "/vsizip/a.zip/dem.asc"
+  std::string driver;
+  std::vector<std::string> files;  // that GDAL knows to belong to it
   std::vector<std::string> assumptions;
 };
 
-// Throws IoError with the remedy. REQUIRES: a GdalSession on this thread.
-OpenedRaster open_dataset(const std::string& path);
+bool is_netcdf(GDALDataset& dataset);
+// Another one than the picture's own pixels.
+bool has_geotransform(GDALDataset& dataset);
+
+// `open_options`: NAME=VALUE for the driver. Throws IoError with the remedy. REQUIRES: a GdalSession on
+// this thread.
+OpenedRaster open_dataset(const std::string& path, const std::vector<std::string>& open_options);
 
 }  // namespace qmpipe

@@ -1,6 +1,5 @@
 #include "formats/raster_files.h"
 
-#include <cpl_string.h>
 #include <cpl_vsi.h>
 #include <gdal_priv.h>
 
@@ -28,28 +27,28 @@ bool is_mosaic(const std::string& path) { return EQUAL(CPLGetExtension(path.c_st
 
 using FilesByPath = std::map<std::string, RasterFile>;
 
-void collect(const std::string& path, FilesByPath& files) {
-  const OpenedRaster opened = open_dataset(path);
-  const CPLStringList names(opened.dataset->GetFileList());
-  if (names.empty()) {
+void collect(const std::string& path, const std::vector<std::string>& open_options,
+             FilesByPath& files) {
+  const OpenedRaster opened = open_dataset(path, open_options);
+  if (opened.files.empty()) {
     if (const auto file = describe_file(path)) files.emplace(path, *file);
   }
-  for (int k = 0; k < names.size(); ++k) {
-    const std::string name = names[k];
+  for (const std::string& name : opened.files) {
     const auto file = describe_file(name);
     if (!file) continue;
     const bool is_new = files.emplace(name, *file).second;
     // GDAL lists what a mosaic reads, not what that reads in turn.
-    if (is_new && name != path && is_mosaic(name)) collect(name, files);
+    if (is_new && name != path && is_mosaic(name)) collect(name, open_options, files);
   }
 }
 
 }  // namespace
 
-std::vector<RasterFile> files_of_raster(const std::string& path) {
+std::vector<RasterFile> files_of_raster(const std::string& path,
+                                        const std::vector<std::string>& open_options) {
   const GdalSession quiet;
   FilesByPath by_path;
-  collect(path, by_path);
+  collect(path, open_options, by_path);
   std::vector<RasterFile> files;
   for (const auto& [name, file] : by_path) files.push_back(file);
   return files;

@@ -16,7 +16,8 @@ struct RasterFile {
 
 // The file itself, its side files, and what a mosaic (VRT) reads, mosaics of mosaics too; sorted by
 // path, no path twice. What has no size and time of its own (a subdataset's name, a database) is
-// left out. Throws IoError when the raster cannot be opened.
-std::vector<RasterFile> files_of_raster(const std::string& path);
+// left out. `open_options`: as in HeightOptions. Throws IoError when the raster cannot be opened.
+std::vector<RasterFile> files_of_raster(const std::string& path,
+                                        const std::vector<std::string>& open_options);
 
 }  // namespace qmpipe

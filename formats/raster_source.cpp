@@ -10,52 +10,21 @@
 
 #include "formats/errors.h"
 #include "formats/gdal_session.h"
+#include "formats/height_band.h"
 #include "formats/height_rule.h"
 #include "formats/height_watch.h"
 #include "formats/raster_crs.h"
 #include "formats/raster_dataset.h"
 #include "formats/raster_placement.h"
+#include "formats/raster_plane.h"
 #include "formats/raster_reader.h"
 #include "formats/unplaced_pixels.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
-namespace {
-
-// None when the file has no geotransform and does not need one: in a plane without CRS.
-std::optional<PixelPlane> plane_of(GDALDataset& dataset, const std::string& path, CrsNeed need) {
-  std::array<double, 6> g{};
-  const bool is_given = dataset.GetGeoTransform(g.data()) == CE_None;
-  if (!is_given || g == std::array<double, 6>{0, 1, 0, 0, 0, 1}) {
-    const bool has_points = dataset.GetGCPCount() > 0;
-    if (need == CrsNeed::kOptional && !has_points) return std::nullopt;
-    throw IoError("cannot place the raster", path,
-                  has_points ? "it has ground control points, but no geotransform"
-                             : "it has no geotransform: nothing says where its pixels lie",
-                  has_points ? "make a georeferenced one with: gdalwarp FILE NEW.tif"
-                             : "write the bounds into it: gdal_translate -a_ullr WEST NORTH EAST "
-                               "SOUTH FILE NEW.tif");
-  }
-  const PixelPlane plane{.x0 = g[0],
-                         .x_per_column = g[1],
-                         .x_per_row = g[2],
-                         .y0 = g[3],
-                         .y_per_column = g[4],
-                         .y_per_row = g[5]};
-  const double area = plane.determinant();
-  if (!std::isfinite(area) || area == 0 || !std::isfinite(g[0]) || !std::isfinite(g[3])) {
-    throw IoError("cannot place the raster", path,
-                  fmt::format("its geotransform ({}) cannot be inverted", fmt::join(g, ", ")),
-                  "write the bounds into it: gdal_translate -a_ullr WEST NORTH EAST SOUTH FILE "
-                  "NEW.tif");
-  }
-  return plane;
-}
-
-}  // namespace
-
 struct RasterSource::Impl {
   OpenedRaster opened;
+  HeightBand height_band;
   GDALRasterBand* band = nullptr;
   RasterInfo info;
   HeightOptions height_options;
@@ -71,6 +40,7 @@ struct RasterSource::Impl {
   std::vector<std::uint8_t> mask;
 
   void describe(const std::string& path);
+  bool is_of_earth = true;
   void take_heights(const RasterCrs& crs);
   void place_in_plane(const RasterCrs& crs);
   void place_on_globe(const RasterCrs& crs);
@@ -81,23 +51,16 @@ struct RasterSource::Impl {
 
 void RasterSource::Impl::describe(const std::string& path) {
   GDALDataset& dataset = *opened.dataset;
-  band = dataset.GetRasterBand(1);
+  height_band = height_band_of(opened, path, height_options);
+  band = height_band.band;
   info.path = path;
-  info.driver = dataset.GetDriver() != nullptr ? dataset.GetDriver()->GetDescription() : "unknown";
+  info.driver = opened.driver;
   info.width = dataset.GetRasterXSize();
   info.height = dataset.GetRasterYSize();
   info.assumptions = opened.assumptions;
-  const GDALDataType type = band->GetRasterDataType();
-  info.type_name = GDALGetDataTypeName(type);
-  if (GDALDataTypeIsComplex(type) != 0) {
-    throw IoError("cannot read heights from", path, "its values are complex numbers",
-                  "write the part that holds heights with gdal_calc.py or gdal_translate");
-  }
-  if (dataset.GetRasterCount() > 1 && info.driver != "BAG" &&
-      dataset.GetRasterBand(2)->GetColorInterpretation() != GCI_AlphaBand) {
-    info.assumptions.push_back(
-        fmt::format("the file has {} bands; the first is taken", dataset.GetRasterCount()));
-  }
+  info.assumptions.insert(info.assumptions.end(), height_band.assumptions.begin(),
+                          height_band.assumptions.end());
+  info.type_name = GDALGetDataTypeName(band->GetRasterDataType());
 }
 
 void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
@@ -118,6 +81,7 @@ void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
 }
 
 void RasterSource::Impl::take_heights(const RasterCrs& crs) {
+  is_of_earth = is_of_earth_size(crs);
   RuledHeights heights = height_rule_of(*band, info.driver, crs, height_options);
   rule = std::move(heights.rule);
   info.unit = std::move(heights.unit);
@@ -187,7 +151,7 @@ std::unique_ptr<RasterSource> RasterSource::open(const std::string& path,
                                                  const OpenOptions& options) {
   const GdalSession quiet;
   auto impl = std::make_unique<Impl>();
-  impl->opened = open_dataset(path);
+  impl->opened = open_dataset(path, options.heights.open_options);
   impl->height_options = options.heights;
   impl->describe(path);
   if (options.placement) {
@@ -196,15 +160,19 @@ std::unique_ptr<RasterSource> RasterSource::open(const std::string& path,
     impl->take_heights(options.placement->crs);
   } else {
     const bool on_globe = options.placing == Placing::kGlobe;
+    require_no_points(*impl->opened.dataset, path);
     const RasterCrs crs =
         crs_of(*impl->opened.dataset, path, impl->opened.name, options.crs_override,
                on_globe ? CrsNeed::kRequired : CrsNeed::kOptional);
+    require_earth(crs, path, options.placing);
     impl->place_in_plane(crs);
+    require_degrees(impl->info, crs, path, options.crs_override);
     impl->take_heights(crs);
     if (on_globe) impl->place_on_globe(crs);
   }
   describe_blocks(*impl->band, impl->rule.has_mask, impl->info);
-  if (options.tally) {
+  // In a plane it may be of another world.
+  if (options.tally && impl->is_of_earth) {
     impl->watch.emplace(options.tally, options.number, impl->rule, impl->info,
                         impl->height_options);
   }
@@ -226,6 +194,10 @@ void RasterSource::read(const PixelWindow& window, std::span<double> out) const 
   QMPIPE_CHECK(window.column0 >= 0 && window.column0 + window.width <= impl.info.width);
   QMPIPE_CHECK(window.row0 >= 0 && window.row0 + window.height <= impl.info.height);
   impl.read(window, out, true);
+}
+
+void set_gdal_config(const std::string& name, const std::string& value) {
+  CPLSetConfigOption(name.c_str(), value.c_str());
 }
 
 void set_gdal_cache_bytes(std::int64_t bytes) { GDALSetCacheMax64(bytes); }

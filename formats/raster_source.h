@@ -113,6 +113,9 @@ class RasterSource {
   std::unique_ptr<Impl> impl_;
 };
 
+// For the whole process; to be called before anything is opened.
+void set_gdal_config(const std::string& name, const std::string& value);
+
 // Bounds GDAL's own block cache for the whole process.
 void set_gdal_cache_bytes(std::int64_t bytes);
 

@@ -50,6 +50,7 @@ ComparedMethod build_and_measure(const CompareOptions& options, const ComparedCh
   BuildResult built = build_pyramid(build, progress);
   progress.note(fmt::format("{}: measuring", name_of(choice)));
   const VerifyOptions verify_options = {.sources = build.input.paths,
+                                        .heights = build.input.heights,
                                         .hausdorff = HausdorffMode::kMeasured,
                                         .threads = build.run.threads};
   return {.choice = choice,

@@ -27,12 +27,17 @@ json inputs_of(const InputOptions& input) {
   json inputs = json::array();
   for (const std::string& path : input.paths) {
     json files = json::object();
-    for (const RasterFile& file : files_of_raster(path)) {
+    for (const RasterFile& file : files_of_raster(path, input.heights.open_options)) {
       files[absolute_name(file.path)] = {{"bytes", file.bytes}, {"modified_ns", file.modified_ns}};
     }
     inputs.push_back({{"name", absolute_name(path)}, {"files", files}});
   }
   return inputs;
+}
+
+std::string hash_text(const std::string& text) {
+  return fmt::format("{:016x}",
+                     hash64({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, 0));
 }
 
 json parameters_of(const BuildOptions& options) {
@@ -56,6 +61,14 @@ json parameters_of(const BuildOptions& options) {
       {"normals", options.encode.normals}};
   const json heights = json::parse(write_heights(options.input.heights));
   for (const auto& [name, value] : heights.items()) parameters["--" + name] = value;
+  // Values that are not written.
+  std::string hidden;
+  for (const auto* list : {&options.input.heights.config, &options.input.heights.open_options}) {
+    for (const std::string& option : *list) {
+      if (!is_secret(option)) hidden += option + "\n";
+    }
+  }
+  if (!hidden.empty()) parameters["--oo and --config, their values"] = hash_text(hidden);
   for (const ParameterInfo& info : parameters_of(mesh.method, mesh.stop)) {
     parameters[info.name] = mesh.parameters.of(info.name).text();
   }
@@ -105,11 +118,6 @@ json texts_of(const OutputOptions& output) {
   return {{"--name", output.name},
           {"--description", output.description},
           {"--attribution", output.attribution}};
-}
-
-std::string hash_text(const std::string& text) {
-  return fmt::format("{:016x}",
-                     hash64({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, 0));
 }
 
 void compare_versions(const json& was, const json& is, std::vector<std::string>& differences) {

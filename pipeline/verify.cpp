@@ -147,7 +147,8 @@ void Verification::look_for_missing_tiles(const std::vector<TileKey>& keys) {
   }
   // Tiles with a void are left out there.
   if (recipe_->voids.kind == VoidPolicy::Kind::kOmit) return;
-  log_.add_all(check_pixels(source_->sources(), *recipe_, keys, expected));
+  log_.add_all(check_pixels(source_->sources(), options_.heights.or_else(recipe_->heights),
+                            *recipe_, keys, expected));
 }
 
 VerifyReport Verification::run() {

@@ -23,12 +23,13 @@ constexpr std::int32_t kMostZoomsBetween = 5;
 
 class PixelCheck {
  public:
-  PixelCheck(const std::vector<RasterInfo>& sources, const Recipe& recipe)
+  PixelCheck(const std::vector<RasterInfo>& sources, const HeightOptions& heights,
+             const Recipe& recipe)
       : recipe_(recipe),
         scheme_(recipe.projection),
         reach_(
             std::int64_t{1} << std::min(kMostZoomsBetween, recipe.sampling_zoom - recipe.max_zoom)),
-        pool_(std::make_shared<const std::vector<RasterInfo>>(sources), {}, 1) {}
+        pool_(std::make_shared<const std::vector<RasterInfo>>(sources), {.heights = heights}, 1) {}
 
   // Of the source's pixel, where it stands among valid ones and the scheme has a tile.
   std::optional<TileKey> tile_at(std::size_t source, std::int64_t column, std::int64_t row);
@@ -88,7 +89,8 @@ std::vector<std::int64_t> spread_between(std::int64_t length, std::int64_t reach
 
 }  // namespace
 
-std::vector<Finding> check_pixels(const std::vector<RasterInfo>& sources, const Recipe& recipe,
+std::vector<Finding> check_pixels(const std::vector<RasterInfo>& sources,
+                                  const HeightOptions& heights, const Recipe& recipe,
                                   const std::vector<TileKey>& keys,
                                   const std::vector<TileKey>& expected) {
   std::vector<Finding> findings;
@@ -96,7 +98,7 @@ std::vector<Finding> check_pixels(const std::vector<RasterInfo>& sources, const 
   const auto per_side = std::clamp(
       static_cast<std::int64_t>(std::sqrt(kPixelsInAll / static_cast<double>(sources.size()))),
       kFewestPerSide, kMostPerSide);
-  PixelCheck check(sources, recipe);
+  PixelCheck check(sources, heights, recipe);
   std::set<TileKey> missing;
   for (std::size_t k = 0; k < sources.size(); ++k) {
     for (const std::int64_t row : spread_between(sources[k].height, check.reach(), per_side)) {

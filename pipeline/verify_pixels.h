@@ -13,8 +13,10 @@ namespace qmpipe {
 
 // Of some thousand pixels in all that stand among valid ones, the tiles of the deepest zoom that the
 // set lacks, each once; none of those in `expected`, which are looked for otherwise.
+// `heights`: what the sources were opened with.
 // REQUIRES: keys and expected are sorted. Throws IoError when a source cannot be read.
-std::vector<Finding> check_pixels(const std::vector<RasterInfo>& sources, const Recipe& recipe,
+std::vector<Finding> check_pixels(const std::vector<RasterInfo>& sources,
+                                  const HeightOptions& heights, const Recipe& recipe,
                                   const std::vector<TileKey>& keys,
                                   const std::vector<TileKey>& expected);
 

@@ -10,14 +10,14 @@
 
 #include "formats/lattice_window.h"
 #include "formats/raster_source.h"
-#include "pipeline/build_plan.h"
 #include "pipeline/block_cover.h"
+#include "pipeline/build_plan.h"
 #include "pipeline/estimate.h"
 #include "pipeline/memory_share.h"
 #include "pipeline/scratch_folder.h"
 #include "pipeline/survey.h"
-#include "stages/height_step.h"
 #include "stages/finer_error.h"
+#include "stages/height_step.h"
 #include "stages/sampling.h"
 
 namespace qmpipe {
@@ -156,6 +156,22 @@ class SampledPosts final : public SourcePosts {
   mutable tbb::enumerable_thread_specific<std::unique_ptr<Sampler>> samplers_;
 };
 
+// What a set names and gives no value for.
+void note_untold(const HeightOptions& given, const std::vector<std::string>& names,
+                 Progress& progress) {
+  for (const std::string& name : names) {
+    const auto is_it = [&name](const std::string& option) { return option_name(option) == name; };
+    if (std::any_of(given.config.begin(), given.config.end(), is_it) ||
+        std::any_of(given.open_options.begin(), given.open_options.end(), is_it)) {
+      continue;
+    }
+    progress.note(
+        fmt::format("the set was built with a value for {0} that it does not tell: give the same "
+                    "--config or --oo {0}=VALUE here, or heights may differ",
+                    name));
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
@@ -166,6 +182,7 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
   survey.threads = options.threads;
   survey.open_sources = sources_open_at_once(options.threads);
   if (recipe && survey.source_crs.empty()) survey.source_crs = recipe->source_crs;
+  if (recipe) note_untold(options.heights, recipe->heights.config, progress);
   survey.heights = recipe ? options.heights.or_else(recipe->heights) : options.heights;
   // An input that cannot be opened is told before work starts.
   std::vector<RasterInfo> sources = describe_inputs(survey);

@@ -138,5 +138,71 @@ TEST(HeightRule, WhatHeightsAreAboveIsNamed) {
   }
 }
 
+TEST(HeightRule, FeetOfTheCrsAreNoFeetOfHeightsAndTheFactorIsTold) {
+  const TemporaryFolder folder;
+  RasterFixture fixture{.crs = "EPSG:2225"};
+  fixture.geotransform = {{6000000, 100, 0, 2000000, 0, -100}};
+  const std::string path = file_in(folder, "a.tif");
+  const auto source = open_fixture(path, fixture);
+  EXPECT_EQ(read_all(*source)[3], 3);
+  ASSERT_THAT(source->info().assumptions, Contains(HasSubstr("--z-scale 0.3048006096")));
+  // Where the unit is said there is nothing to tell.
+  fixture.unit = "us-ft";
+  EXPECT_THAT(open_fixture(path, fixture)->info().assumptions, IsEmpty());
+  fixture.unit = "";
+  fixture.crs = "EPSG:2225+6360";
+  EXPECT_THAT(open_fixture(path, fixture)->info().assumptions, IsEmpty());
+  EXPECT_NEAR(read_all(*RasterSource::open(path))[3], 3 * 1200.0 / 3937, 1e-9);
+}
+
+TEST(HeightUnit, AFootIsOneInEverySpelling) {
+  const double us_foot = 1200.0 / 3937.0;
+  for (const char* name : {"US Foot",
+                           "US Feet",
+                           "us foot",
+                           "Feet (US Survey)",
+                           "Foot (US survey)",
+                           "US survey ft",
+                           "ft-us",
+                           "ftUS",
+                           "FT_US",
+                           "foot_us",
+                           "Foot_US",
+                           "U.S. survey feet",
+                           "survey foot",
+                           "sft",
+                           "US-ft",
+                           "usft",
+                           "us_survey_foot",
+                           "United States survey foot",
+                           "feet us survey",
+                           "ft (US survey)"}) {
+    ASSERT_TRUE(metres_per_unit(name)) << name;
+    EXPECT_EQ(*metres_per_unit(name), us_foot) << name;
+  }
+  for (const char* name : {"foot", "Feet", "FT", "ft.", "international foot",
+                           "Foot (International)", "intl. feet", "ift", "feets"}) {
+    ASSERT_TRUE(metres_per_unit(name)) << name;
+    EXPECT_EQ(*metres_per_unit(name), 0.3048) << name;
+  }
+  for (const auto& [name, metres] : {std::pair{"Metres", 1.0},
+                                     {"METER", 1.0},
+                                     {"[m]", 1.0},
+                                     {"cm", 0.01},
+                                     {"Centimeters", 0.01},
+                                     {"mm", 0.001},
+                                     {"decimetres", 0.1},
+                                     {"km", 1000.0},
+                                     {"Fathoms", 1.8288},
+                                     {"yds", 0.9144}}) {
+    ASSERT_TRUE(metres_per_unit(name)) << name;
+    EXPECT_EQ(*metres_per_unit(name), metres) << name;
+  }
+  for (const char* name : {"m2", "m/s", "K", "us", "survey", "international", "british foot",
+                           "football", "status", "sms", "degrees", "1"}) {
+    EXPECT_FALSE(metres_per_unit(name)) << name;
+  }
+}
+
 }  // namespace
 }  // namespace qmpipe::testing

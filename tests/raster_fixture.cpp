@@ -39,6 +39,12 @@ void describe(GDALRasterBand& band, const RasterFixture& fixture) {
   if (fixture.void_value) band.SetNoDataValue(*fixture.void_value);
   if (fixture.scale != 1) band.SetScale(fixture.scale);
   if (fixture.offset != 0) band.SetOffset(fixture.offset);
+  if (fixture.has_palette) {
+    GDALColorTable colours;
+    const GDALColorEntry entry{10, 20, 30, 255};
+    colours.SetColorEntry(1, &entry);
+    require(band.SetColorTable(&colours) == CE_None, "palette");
+  }
   if (!fixture.unit.empty()) band.SetUnitType(fixture.unit.c_str());
   for (const auto& [name, value] : fixture.band_metadata) {
     band.SetMetadataItem(name.c_str(), value.c_str());
@@ -55,13 +61,21 @@ void fill(GDALDataset& dataset, const RasterFixture& fixture) {
     require(band.RasterIO(GF_Write, 0, r, fixture.width, 1, row.data(), fixture.width, 1,
                           GDT_Float64, 0, 0, nullptr) == CE_None,
             "values");
-    for (int c = 0; c < fixture.width; ++c)
-      row[static_cast<std::size_t>(c)] = (c + r) % 7 == 0 ? 0 : 1;
     for (int b = 0; b < fixture.more_bands; ++b) {
+      for (int c = 0; c < fixture.width; ++c) {
+        row[static_cast<std::size_t>(c)] = fixture.band_value ? fixture.band_value(2 + b, c, r)
+                                           : (c + r) % 7 == 0 ? 0
+                                                              : 1;
+      }
       require(dataset.GetRasterBand(2 + b)->RasterIO(GF_Write, 0, r, fixture.width, 1, row.data(),
                                                      fixture.width, 1, GDT_Float64, 0, 0,
                                                      nullptr) == CE_None,
               "values of more bands");
+    }
+  }
+  for (std::size_t b = 0; b < fixture.more_metadata.size(); ++b) {
+    for (const auto& [name, value] : fixture.more_metadata[b]) {
+      dataset.GetRasterBand(2 + static_cast<int>(b))->SetMetadataItem(name.c_str(), value.c_str());
     }
   }
   if (fixture.mask.empty()) return;

@@ -39,6 +39,11 @@ struct RasterFixture {
   std::vector<std::uint8_t> mask = {};
   // Further bands, which hold 1 everywhere but 0 where column + row can be divided by seven.
   int more_bands = 0;
+  // In place of that: of band, from 2 on, column and row.
+  std::function<double(int, int, int)> band_value = {};
+  // Of the second band and so on.
+  std::vector<std::map<std::string, std::string>> more_metadata = {};
+  bool has_palette = false;
 };
 
 // Adds a file to a zip archive, which is made where it is missing. Throws std::runtime_error.

@@ -42,6 +42,7 @@ std::vector<Layout> layouts() {
 RasterFixture fixture_of(const std::string& type, const Layout& layout, bool has_mask,
                          std::uint64_t seed) {
   RasterFixture fixture{.width = 307, .height = 260, .type = type};
+  fixture.geotransform = {{10, 0.1, 0, 50, 0, -0.1}};
   fixture.void_value = 13;
   fixture.scale = 0.3;
   fixture.offset = -5;
@@ -60,9 +61,16 @@ RasterFixture fixture_of(const std::string& type, const Layout& layout, bool has
   return fixture;
 }
 
+// Of a picture too.
+HeightOptions first_band() {
+  HeightOptions options;
+  options.band = 1;
+  return options;
+}
+
 std::unique_ptr<RasterSource> open_cached(const std::string& path,
                                           const std::shared_ptr<SourceBlockCache>& cache) {
-  return RasterSource::open(path, {.cache = cache});
+  return RasterSource::open(path, {.heights = first_band(), .cache = cache});
 }
 
 // Equal bits, and NaN where the other is NaN.
@@ -76,7 +84,7 @@ std::unique_ptr<RasterSource> open_cached(const std::string& path,
 
 void compare(const std::string& path, std::uint64_t seed, std::int64_t bound_bytes) {
   const auto cache = std::make_shared<SourceBlockCache>(bound_bytes);
-  const auto plain = RasterSource::open(path);
+  const auto plain = RasterSource::open(path, {.heights = first_band()});
   const auto cached = open_cached(path, cache);
   const RasterInfo& info = plain->info();
   std::mt19937_64 random(seed);

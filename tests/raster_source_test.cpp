@@ -216,7 +216,7 @@ TEST(RasterSource, CrsOffTheGlobeIsRefused) {
   fixture.crs = "EPSG:4326";
   fixture.geotransform = {{500000, 30, 0, 4000000, 0, -30}};
   write_raster(file_in(folder, "b.tif"), fixture);
-  EXPECT_THAT(refusal_of(file_in(folder, "b.tif")), HasSubstr("globe"));
+  EXPECT_THAT(refusal_of(file_in(folder, "b.tif")), HasSubstr("no degrees"));
 }
 
 TEST(RasterSource, FilesThatAreNoRastersAreRefused) {

@@ -152,6 +152,11 @@ class SourceHeights(unittest.TestCase):
         self.assertEqual(recipe["heights"], {"void": "-9999,<-12000", "z-scale": 0.5,
                                              "z-offset": -30})
         self.assertIn("0 faults", self.done("verify", tiles, "--source", dem).stdout)
+        # Where all that a tile would have is void.
+        half = self.grid("half.tif", [[-9999 if c < 300 else c for c in range(600)]
+                                      for _ in range(300)])
+        self.done("build", half, "-o", self.place / "half", "--void", -9999)
+        self.assertIn("0 faults", self.done("verify", self.place / "half", "--source", half).stdout)
         # What is given by hand goes first.
         done = run("verify", tiles, "--source", dem, "--z-offset", 4000)
         self.assertEqual(done.returncode, 3, done.said)
@@ -208,6 +213,163 @@ class SourceHeights(unittest.TestCase):
         told = self.done("build", dem, "-o", self.place / "c").stderr
         self.assertNotIn("geoid", told)
 
+    # Which numbers are heights.
+
+    def test_pictures_are_refused_and_decoded_where_they_encode_heights(self):
+        picture, encoded = self.data("rgb_picture.tif"), self.data("terrain_rgb.tif")
+        for line in (*self.commands(picture), *self.commands(encoded)):
+            with self.subTest(line[:3]):
+                refused = run(*line)
+                self.assertEqual(refused.returncode, 1, refused.said)
+                self.assertIn("picture", refused.said)
+                self.assertIn("--encoding terrarium", refused.said)
+                self.assertIn("--band 1", refused.said)
+        self.assertIn("--encoding terrain-rgb (which they look like)",
+                      run("tin", encoded, "-o", self.place / "a.ply").said)
+        for line in self.commands(encoded, "--encoding", "terrain-rgb"):
+            with self.subTest(line[:2]):
+                self.done(*line)
+        low, high = self.heights(encoded, "--encoding", "terrain-rgb")
+        self.assertTrue(-500 < low < high < 9000, (low, high))
+        tiles = self.place / "decoded"
+        self.done("build", encoded, "-o", tiles, "--encoding", "terrain-rgb")
+        self.assertIn("0 faults", self.done("verify", tiles, "--source", encoded).stdout)
+        self.assertEqual(self.heights(picture, "--band", 1)[0] >= 0, True)
+
+    def test_the_grid_that_is_a_height_is_taken_from_a_container(self):
+        dem = self.data("nc_tid_first.nc")
+        for line in self.commands(dem):
+            with self.subTest(line[:2]):
+                self.assertRegex(self.done(*line).stderr, "elevation is taken.*name.*tid'")
+        self.assertGreater(self.heights(dem)[1], 100)
+        self.done("tin", f'NETCDF:"{dem}":tid', "-o", self.place / "tid.ply")
+
+    def test_bands_are_chosen_by_number(self):
+        one, two = self.slope("one.tif"), self.slope("two.tif", mark=5000)
+        both = self.place / "both.vrt"
+        subprocess.run(["gdalbuildvrt", "-q", "-separate", str(both), str(one), str(two)],
+                       check=True)
+        for line in self.commands(both):
+            self.assertIn("--band 2", self.done(*line).stderr)
+        self.assertLess(self.heights(both)[1], 1000)
+        self.assertEqual(self.heights(both, "--band", 2)[1], 5000)
+        refused = run("tin", both, "-o", self.place / "a.ply", "--band", 3)
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("2 bands", refused.said)
+
+    def test_the_fine_grid_of_a_bag_is_an_open_option_away(self):
+        bag = self.data("test_vr.bag")
+        told = self.done("build", bag, "-o", self.place / "coarse").stderr
+        option = self.advice(told, "--oo")
+        self.assertEqual(option, ["--oo", "MODE=RESAMPLED_GRID"])
+        deepest = {}
+        for name, options in (("coarse", []), ("fine", option)):
+            tiles = self.place / name
+            if options:
+                self.done("build", bag, "-o", tiles, *options)
+            self.assertIn("0 faults", self.done("verify", tiles, "--source", bag).stdout)
+            deepest[name] = json.loads((tiles / "layer.json").read_text())["maxzoom"]
+        self.assertGreater(deepest["fine"], deepest["coarse"] + 1)
+
+    def test_configuration_reaches_gdal_and_secrets_no_file(self):
+        dem = self.slope("a.tif")
+        tiles = self.place / "tiles"
+        options = ["--config", "GDAL_CACHEMAX=64", "--config", "AWS_SECRET_ACCESS_KEY=hunter2",
+                   "--oo", "API_KEY=hunter2", "--oo", "NUM_THREADS=1"]
+        done = self.done("build", dem, "-o", tiles, "-v", *options)
+        self.assertNotIn("hunter2", done.said)
+        self.assertIn("no open option API_KEY", done.stderr)
+        for path in tiles.rglob("*"):
+            if path.is_file():
+                self.assertNotIn(b"hunter2", path.read_bytes(), path)
+        heights = json.loads((tiles / "layer.json").read_text())["qmpipe"]["heights"]
+        self.assertEqual(heights, {"config": ["GDAL_CACHEMAX"], "oo": ["NUM_THREADS=1"]})
+        self.assertIn("built already", self.done("build", dem, "-o", tiles, *options).stdout)
+        # Another value of what a set was built with is another set.
+        refused = run("build", dem, "-o", tiles, "--config", "GDAL_CACHEMAX=65", *options[2:])
+        self.assertEqual(refused.returncode, 1, refused.said)
+        self.assertIn("--config", refused.stderr)
+        # It reaches GDAL: a driver that is skipped opens nothing.
+        refused = run("build", dem, "-o", self.place / "b", "--config", "GDAL_SKIP=GTiff")
+        self.assertEqual(refused.returncode, 1, refused.said)
+
+    def test_options_of_somebody_elses_set_name_no_files(self):
+        dem = self.slope("a.tif")
+        tiles = self.place / "tiles"
+        self.done("build", dem, "-o", tiles)
+        layer = json.loads((tiles / "layer.json").read_text())
+        for heights in ({"oo": ["GEOREF_SOURCES=/etc/passwd"]}, {"oo": ["A=<VRTDataset>"]},
+                        {"oo": ["A=http://127.0.0.1/"]}, {"oo": "x"}, {"config": ["A/B"]},
+                        {"band": 0}, {"band": 1e9}, {"void": 3}, {"void": "x"}, {"z-scale": 0},
+                        {"z-offset": 1e300}, {"encoding": "x"}, []):
+            with self.subTest(heights):
+                layer["qmpipe"]["heights"] = heights
+                (tiles / "layer.json").write_text(json.dumps(layer))
+                done = run("verify", tiles, "--source", dem)
+                self.assertEqual(done.returncode, 3, done.said)
+                self.assertIn("layer.json", done.said)
+
+    # Units.
+
+    def test_units_and_what_a_unit_of_the_crs_may_mean(self):
+        self.assertNotIn("unknown", self.done(*self.commands(self.data("unit_usfoot.tif"))[0]).stderr)
+        low, high = self.heights(self.data("unit_usfoot.tif"))
+        self.assertTrue(99 < low < high < 902, (low, high))
+        dem = self.data("stateplane_ftus.tif")
+        for line in self.commands(dem):
+            with self.subTest(line[:2]):
+                option = self.advice(self.done(*line).stderr, "--z-scale")
+        feet = self.heights(dem)[1]
+        self.assertAlmostEqual(self.heights(dem, *option)[1], feet * 1200 / 3937, delta=0.01)
+
+    # Where, and on which body.
+
+    def test_each_kind_of_misplaced_raster_has_its_own_remedy(self):
+        points = self.data("gcp_only.tif")
+        for options in ([], ["--source-crs", "EPSG:4326"]):
+            refused = run("build", points, "-o", self.place / "a", *options)
+            self.assertEqual(refused.returncode, 1, refused.said)
+            remedy = re.search("gdalwarp .*", refused.said).group()
+            self.assertNotIn("--source-crs", refused.said)
+        warped = self.place / "warped.tif"
+        subprocess.run([*shlex.split(remedy.replace("FILE", str(points)).replace(
+            "NEW.tif", str(warped)))], check=True, capture_output=True)
+        self.done("build", warped, "-o", self.place / "a")
+
+        netcdf = self.data("nc_proj_topdown.nc")
+        refused = run("build", netcdf, "-o", self.place / "b")
+        self.assertEqual(refused.returncode, 1, refused.said)
+        self.assertIn("--source-crs", refused.said)
+        self.assertNotIn("a_ullr", refused.said)
+        self.done("build", netcdf, "-o", self.place / "b", "--source-crs", "EPSG:32632")
+
+    def test_a_crs_that_cannot_be_that_of_the_raster_is_refused(self):
+        metres = self.place / "metres.tif"
+        translate(self.slope("a.tif"), metres, "-a_srs", "EPSG:32632", "-a_ullr", 500000, 4900000,
+                  501000, 4899000)
+        for crs, words in (("EPSG:5773", "heights alone"), ("EPSG:4978", "centre"),
+                           ("EPSG:4326", "no degrees")):
+            for line in self.commands(metres, "--source-crs", crs):
+                with self.subTest(line[:2], crs=crs):
+                    refused = run(*line)
+                    self.assertEqual(refused.returncode, 2, refused.said)
+                    self.assertIn(words, refused.said)
+                    self.assertIn("--source-crs " + crs, refused.said)
+
+    def test_another_body_is_refused_and_never_said_to_be_earth(self):
+        mars = self.data("mars.tif")
+        for line in self.commands(mars):
+            with self.subTest(line[:2]):
+                refused = run(*line)
+                self.assertEqual(refused.returncode, 1, refused.said)
+                self.assertIn("another body", refused.said)
+                self.assertNotIn("EPSG", refused.said)
+        remedy = re.search('gdalwarp .*', refused.said).group()
+        plane = self.place / "plane.tif"
+        subprocess.run(shlex.split(remedy.replace("FILE", str(mars)).replace(
+            "NEW.tif", str(plane))), check=True, capture_output=True)
+        self.done("tin", plane, "-o", self.place / "mars.ply")
+
     def test_compare_measures_against_what_it_built_from(self):
         dem = self.slope("a.tif", mark=-32768, size=300)
         self.done("compare", dem, "-o", self.place / "report", "--methods", "greedy", "--void",
@@ -217,13 +379,17 @@ class SourceHeights(unittest.TestCase):
         dem = self.slope("a.tif")
         for option, values in (("--void", ("x", "<", "1,", "<1,<2", "nan")),
                                ("--z-scale", ("0", "x", "nan", "1e99")),
-                               ("--z-offset", ("x", "inf", "1e9"))):
+                               ("--z-offset", ("x", "inf", "1e9")),
+                               ("--band", ("0", "-1", "x")), ("--encoding", ("x", "")),
+                               ("--oo", ("x", "=1")), ("--config", ("x", "=1"))):
             for value in values:
                 for line in (*self.commands(dem), ["verify", self.place, "--source", dem]):
                     with self.subTest(line[:2], option=option, value=value):
                         done = run(*line, option, value)
                         self.assertEqual(done.returncode, 2, done.said)
                         self.assertIn(option, done.stderr)
+        done = run("tin", dem, "-o", self.place / "a.ply", "--band", 1, "--encoding", "terrarium")
+        self.assertEqual(done.returncode, 2, done.said)
 
 
 if __name__ == "__main__":

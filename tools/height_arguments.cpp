@@ -2,9 +2,38 @@
 
 #include <CLI/CLI.hpp>
 
+#include "formats/raster_source.h"
 #include "tools/parse_values.h"
 
 namespace qmpipe {
+namespace {
+
+void add_gdal_options(CLI::App& command, HeightArguments& arguments) {
+  command
+      .add_option(
+          "--oo", arguments.open_options,
+          "An open option of GDAL's driver (MODE=RESAMPLED_GRID: a BAG's fine grid); once for "
+          "each")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
+  command
+      .add_option(
+          "--config", arguments.config,
+          "A configuration option of GDAL (GDAL_NETCDF_BOTTOMUP=NO); once for each. Secrets are "
+          "better set in the environment")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
+}
+
+void require_pairs(const char* flag, const std::vector<std::string>& options) {
+  for (const std::string& option : options) {
+    const std::size_t equals = option.find('=');
+    if (equals != std::string::npos && equals > 0) continue;
+    throw UsageError(std::string(flag) + " " + option + ": give NAME=VALUE");
+  }
+}
+
+}  // namespace
 
 void add_height_options(CLI::App& command, HeightArguments& arguments) {
   command
@@ -13,6 +42,16 @@ void add_height_options(CLI::App& command, HeightArguments& arguments) {
           "Values that mark voids besides the declared one, as the band stores them, between "
           "commas; <X and >Y: all below X, above Y (-9999,-32768 or \"<-12000,>9000\")")
       ->type_name("VALUES");
+  command
+      .add_option("--band", arguments.band,
+                  "Take the numbers of this band for heights, whatever they are (default: the "
+                  "first; pictures are refused)")
+      ->type_name("N");
+  command
+      .add_option("--encoding", arguments.encoding,
+                  "How the colours of pictures encode heights: terrain-rgb or terrarium")
+      ->check(CLI::IsMember({"terrain-rgb", "terrarium"}));
+  add_gdal_options(command, arguments);
   command
       .add_option(
           "--z-scale", arguments.z_scale,
@@ -36,6 +75,17 @@ HeightOptions to_height_options(const HeightArguments& arguments) {
   HeightOptions options;
   if (!arguments.voids.empty()) {
     options.voids = understood("--void", void_values_named(arguments.voids));
+  }
+  options.band = arguments.band;
+  if (!arguments.encoding.empty()) {
+    options.encoding = understood("--encoding", height_encoding_named(arguments.encoding));
+  }
+  require_pairs("--oo", arguments.open_options);
+  require_pairs("--config", arguments.config);
+  options.open_options = arguments.open_options;
+  options.config = arguments.config;
+  for (const std::string& option : options.config) {
+    set_gdal_config(option_name(option), option.substr(option.find('=') + 1));
   }
   options.z_scale = arguments.z_scale;
   options.z_offset_m = arguments.z_offset_m;
