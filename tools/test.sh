@@ -136,21 +136,20 @@ PYTHON
   return $status
 }
 
-# fuzz_target PROGRAM: new inputs stay in the build folder; a crash leaves its input there too.
+# fuzz_target PROGRAM: of the preset `asan`; new inputs stay in the build folder; a crash leaves its input there too.
 fuzz_target() {
   local name=${1##*/fuzz_}
-  local work=build/fuzz/found/$name
+  local work=build/asan/fuzz/$name
   mkdir -p "$work"
   "$1" -max_total_time=$fuzz_seconds -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
-    -artifact_prefix="$work/" "$work" "tests/fuzz/corpus/$name" >"build/fuzz/$name.log" 2>&1 ||
-    { tail -n 60 "build/fuzz/$name.log"; return 1; }
-  grep 'number_of_executed_units' "build/fuzz/$name.log"
+    -artifact_prefix="$work/" "$work" "tests/fuzz/corpus/$name" >"$work.log" 2>&1 ||
+    { tail -n 60 "$work.log"; return 1; }
+  grep 'number_of_executed_units' "$work.log"
 }
 
 fuzz() {
   local target found=0
-  phase 'fuzz: build' configure_and_build fuzz
-  for target in build/fuzz/tests/fuzz/fuzz_*; do
+  for target in build/asan/tests/fuzz/fuzz_*; do
     if ! [ -x "$target" ] || [ -d "$target" ]; then continue; fi
     found=1
     check "fuzz: ${target##*/fuzz_}" fuzz_target "$target"
