@@ -17,16 +17,20 @@ class GdalSession {
   GdalSession(const GdalSession&) = delete;
   GdalSession& operator=(const GdalSession&) = delete;
 
-  // What GDAL complained about since this session began, or `otherwise` when it said nothing.
+  // What GDAL complained about since this session began, or `otherwise` when it said nothing. It names
+  // the memory where that is what was lacking: drivers seldom do.
   std::string cause(const std::string& otherwise) const;
   bool failed() const { return failed_; }
-  // For GDAL's callback: severities are CPLErr.
-  void note(int severity, const char* message);
+  // Whether GDAL said so, or there is none to be had now.
+  bool lacks_memory() const;
+  // For GDAL's callback: severities are CPLErr, numbers CPLErrorNum.
+  void note(int severity, int number, const char* message);
 
  private:
   std::string last_error_;
   std::string last_warning_;
   bool failed_ = false;
+  bool lacked_memory_ = false;
 };
 
 }  // namespace qmpipe

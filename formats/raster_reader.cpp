@@ -41,7 +41,9 @@ std::int64_t joined(std::int64_t side, std::int64_t block, std::int64_t length) 
       fmt::format("{} (columns {} to {}, rows {} to {})", session.cause("GDAL could not read it"),
                   window.column0, window.column0 + window.width - 1, window.row0,
                   window.row0 + window.height - 1),
-      "the file may be truncated or damaged; compare its size with the original");
+      session.lacks_memory()
+          ? "give less to do at a time (--threads 1), or a smaller --memory"
+          : "the file may be truncated or damaged; compare its size with the original");
 }
 
 // What a handle keeps for itself after it has read a block: the packed bytes, and of files whose

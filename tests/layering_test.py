@@ -3,7 +3,7 @@
 
 Checked: includes point one way (scheduler <- formats <- stages <- pipeline <- tools; tests and perf
 may include anything); each third-party library is included only where the table below allows it,
-and in no header of ours; no function of the C library whose last bits depend on the processor;
+and in no header of ours; a .cpp includes its own header first, so that this compiles alone; no function of the C library whose last bits depend on the processor;
 every header opens with a comment and has #pragma once; a name that a header defines is defined
 nowhere else; no file is longer than 600 lines; no top-level folder that nobody agreed on.
 
@@ -130,6 +130,15 @@ def check_header(path, lines):
         yield f"{path}:1: a header has #pragma once"
 
 
+def check_first_include(path, lines):
+    """That a header compiles alone is proved by the file that includes it before anything else."""
+    own = f'"{path.with_suffix(".h")}"'
+    number, first = next(((n, line) for n, line in enumerate(lines, start=1)
+                          if INCLUDE.match(line)), (1, ""))
+    if own not in first:
+        yield f"{path}:{number}: the first include is its own header, {own}"
+
+
 def project_files(root):
     for folder in [*LAYERS, *FREE_FOLDERS, ".ci"]:
         for path in sorted((root / folder).rglob("*")):
@@ -164,6 +173,8 @@ def check_tree(root):
             sources[path] = "\n".join(lines)
         if path.suffix == ".h":
             violations += check_header(path, lines)
+        elif path.suffix == ".cpp" and absolute.with_suffix(".h").exists():
+            violations += check_first_include(path, lines)
     # A test is a program of its own, so what it keeps to itself may be called as it likes.
     violations += defined_twice(sources, is_alone=lambda path: layer_of(path) in FREE_FOLDERS)
     return violations, warnings
@@ -197,11 +208,13 @@ GOOD_TREE = {
     "stages/store.h": "// S.\n#pragma once\nnamespace qmpipe {\nclass Post;\n"
                       "class Store { struct Post {}; };\ninline int size_of(int p) { return p; }\n"
                       "namespace detail { struct Post {}; }\n}  // namespace qmpipe\n",
-    "stages/store.cpp": "namespace fs = std::filesystem;\nnamespace qmpipe {\nnamespace {\n"
+    "stages/store.cpp": '#include "stages/store.h"\n'
+                        "namespace fs = std::filesystem;\nnamespace qmpipe {\nnamespace {\n"
                         "struct Entry { int k; };  // struct Post {\n"
                         'const char* const kText = "struct Post { int i; };";\n}\n'
                         "struct Store::Impl { int Post = 1; };\nclass Own {};\n}\n",
-    "stages/names.cpp": "namespace fs = std::filesystem;\nnamespace qmpipe {\nnamespace {\n"
+    "stages/names.cpp": '#include "stages/names.h"\n'
+                        "namespace fs = std::filesystem;\nnamespace qmpipe {\nnamespace {\n"
                         "struct Entry { long k; };\n}\nint f() { struct Post {}; return 0; }\n}\n",
     "tests/names_test.cpp": "namespace qmpipe {\nnamespace {\nstruct Post { int x; };\n}\n}\n",
 }
@@ -242,6 +255,9 @@ FAULTS = [
     ("formats/b.h", HEADER + "inline double f(double y) { return 2*pow(y, 2); }\n", "last bits"),
     ("scheduler/b.cpp", "double x = std::hypot (y, z);\n", "last bits"),
     ("pipeline/b.cpp", "std::normal_distribution<double> x;\n", "last bits"),
+    ("stages/names.cpp", '#include <vector>\n#include "stages/names.h"\n',
+     "stages/names.cpp:1: the first include is its own header, \"stages/names.h\""),
+    ("stages/names.cpp", "int x;\n", "the first include is its own header"),
     ("src/b.cpp", "int x;\n", "src/: not one of the folders"),
     ("tools/b.h", HEADER + "namespace qmpipe {\nstruct Post {\n  int x;\n};\n}\n",
      "tools/b.h:4: qmpipe::Post is defined in stages/names.h:5 too"),

@@ -3,15 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "formats/gzip.h"
 #include "formats/hash64.h"
 #include "formats/layer_json.h"
-#include "formats/quantized_mesh.h"
 #include "formats/tile_path.h"
+#include "pipeline/height_glance.h"
 
 namespace qmpipe {
 namespace {
@@ -19,8 +18,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kTileMediaType = "application/vnd.quantized-mesh";
-// Decoded for the height range that the viewer colours by.
-constexpr std::size_t kTilesSampled = 32;
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlanks = " \t";
@@ -49,19 +46,6 @@ bool has_it(const std::string& if_none_match, const std::string& quoted_etag) {
 
 std::string etag_of(std::span<const std::uint8_t> bytes) {
   return fmt::format("{:016x}", hash64(bytes, 0));
-}
-
-// Evenly spread over the tiles of the deepest zoom.
-std::vector<TileKey> sampled_keys(const std::vector<TileKey>& keys) {
-  const auto first = std::find_if(keys.begin(), keys.end(),
-                                  [&](const TileKey& key) { return key.zoom == keys.back().zoom; });
-  const auto count = static_cast<std::size_t>(keys.end() - first);
-  const std::size_t step = (count + kTilesSampled - 1) / kTilesSampled;
-  std::vector<TileKey> sample;
-  for (std::size_t at = 0; at < count; at += step) {
-    sample.push_back(first[static_cast<std::ptrdiff_t>(at)]);
-  }
-  return sample;
 }
 
 }  // namespace
@@ -120,19 +104,9 @@ std::string TileService::describe() const {
     const RectangleDeg box = bounds_of_deepest(keys, scheme);
     set["bounds_deg"] = {box.west_deg, box.south_deg, box.east_deg, box.north_deg};
   }
-  float low_m = std::numeric_limits<float>::infinity();
-  float high_m = -low_m;
-  for (const TileKey& key : sampled_keys(keys)) {
-    auto stored = tile_set_->read(key);
-    if (!stored) continue;
-    const auto plain = plain_tile_bytes(std::move(*stored));
-    if (!plain) continue;
-    const auto mesh = decode(*plain);
-    if (!mesh) continue;
-    low_m = std::min(low_m, mesh->header.min_height_m);
-    high_m = std::max(high_m, mesh->header.max_height_m);
+  if (const auto heights = glance_at_heights(*tile_set_)) {
+    set["heights_m"] = {heights->low_m, heights->high_m};
   }
-  if (low_m <= high_m) set["heights_m"] = {low_m, high_m};
   set["layer_changes"] = layer_.changes;
   return set.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

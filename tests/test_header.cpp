@@ -1,0 +1,2 @@
+// Compiled for the header that the tests take over from here.
+#include <gtest/gtest.h>
