@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "formats/errors.h"
 #include "formats/free_with.h"
 #include "scheduler/check.h"
 
@@ -193,8 +194,15 @@ std::unique_ptr<CrsTransform> CrsTransform::make(const CrsText& crs,
   impl->context.reset(proj_context_create());
   proj_log_level(impl->context.get(), PJ_LOG_NONE);
   const Object globe(proj_create(impl->context.get(), "EPSG:4326"));
+  // No matter of the raster's CRS.
+  if (!globe) {
+    throw IoError("cannot use", "the database of PROJ",
+                  "it cannot be read, for want of memory or of proj.db",
+                  "give less to do at a time (--threads 1) where memory is short; else install "
+                  "proj-data, or set PROJ_LIB to the folder of proj.db");
+  }
   const Object plane(proj_create(impl->context.get(), crs.wkt.c_str()));
-  if (!globe || !plane) return nullptr;
+  if (!plane) return nullptr;
   if (impl->choose(globe, plane, extent, std::nullopt) == 0) return nullptr;
   // Which operation is best depends on the place, and the place is known only through a first one.
   if (const std::optional<Area> area = impl->area_of(extent)) {

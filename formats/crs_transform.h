@@ -34,7 +34,8 @@ struct CrsText {
 class CrsTransform {
  public:
   // `extent` are points of the raster's extent. None where PROJ knows no way that reaches a single
-  // one of them from the globe (a local CRS, a wrong CRS).
+  // one of them from the globe (a local CRS, a wrong CRS). Throws IoError where the database of PROJ
+  // cannot be read, for want of memory or of its file.
   static std::unique_ptr<CrsTransform> make(const CrsText& crs, std::span<const MapPoint> extent);
   // How far once round the globe is along x, in the CRS's unit, where a place's x depends on its
   // longitude alone and evenly so (Mercator, equirectangular and other cylindrical projections, not

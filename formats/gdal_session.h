@@ -10,6 +10,10 @@
 
 namespace qmpipe {
 
+// Where lacks_memory() says so.
+inline constexpr const char* kNoMemoryRemedy =
+    "give less to do at a time (--threads 1), or a smaller --memory";
+
 class GdalSession {
  public:
   GdalSession();

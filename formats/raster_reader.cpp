@@ -42,7 +42,7 @@ std::int64_t joined(std::int64_t side, std::int64_t block, std::int64_t length) 
                   window.column0, window.column0 + window.width - 1, window.row0,
                   window.row0 + window.height - 1),
       session.lacks_memory()
-          ? "give less to do at a time (--threads 1), or a smaller --memory"
+          ? kNoMemoryRemedy
           : "the file may be truncated or damaged; compare its size with the original");
 }
 

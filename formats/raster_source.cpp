@@ -34,13 +34,14 @@ struct RasterSource::Impl {
   std::optional<HeightWatch> watch;
   std::optional<RasterReader> reader;
   // Without a cache every read is taken for a new block.
+  bool is_of_earth = true;
   bool watches_reads = false;
   std::int64_t reads = 0;
   // Kept between reads.
   std::vector<std::uint8_t> mask;
 
+  void open(const std::string& path, const OpenOptions& options);
   void describe(const std::string& path);
-  bool is_of_earth = true;
   void take_heights(const RasterCrs& crs);
   void place_in_plane(const RasterCrs& crs);
   void place_on_globe(const RasterCrs& crs);
@@ -147,39 +148,49 @@ RasterSource::RasterSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) 
 RasterSource::~RasterSource() = default;
 const RasterInfo& RasterSource::info() const { return impl_->info; }
 
+void RasterSource::Impl::open(const std::string& path, const OpenOptions& options) {
+  opened = open_dataset(path, options.heights.open_options);
+  height_options = options.heights;
+  describe(path);
+  if (options.placement) {
+    info.placement = options.placement;
+    place_in_plane(options.placement->crs);
+    take_heights(options.placement->crs);
+  } else {
+    const bool on_globe = options.placing == Placing::kGlobe;
+    require_no_points(*opened.dataset, path);
+    const RasterCrs crs = crs_of(*opened.dataset, path, opened.name, options.crs_override,
+                                 on_globe ? CrsNeed::kRequired : CrsNeed::kOptional);
+    require_earth(crs, path, options.placing);
+    place_in_plane(crs);
+    require_degrees(info, crs, path, options.crs_override);
+    take_heights(crs);
+    if (on_globe) place_on_globe(crs);
+  }
+  describe_blocks(*band, rule.has_mask, info);
+  // In a plane it may be of another world.
+  if (options.tally && is_of_earth) {
+    watch.emplace(options.tally, options.number, rule, info, height_options);
+  }
+  reader.emplace(*band, rule.has_mask, info, options.cache, options.number,
+                 watch ? &*watch : nullptr);
+  watches_reads = watch && !options.cache;
+  if (grid) note_unplaced();
+}
+
 std::unique_ptr<RasterSource> RasterSource::open(const std::string& path,
                                                  const OpenOptions& options) {
   const GdalSession quiet;
   auto impl = std::make_unique<Impl>();
-  impl->opened = open_dataset(path, options.heights.open_options);
-  impl->height_options = options.heights;
-  impl->describe(path);
-  if (options.placement) {
-    impl->info.placement = options.placement;
-    impl->place_in_plane(options.placement->crs);
-    impl->take_heights(options.placement->crs);
-  } else {
-    const bool on_globe = options.placing == Placing::kGlobe;
-    require_no_points(*impl->opened.dataset, path);
-    const RasterCrs crs =
-        crs_of(*impl->opened.dataset, path, impl->opened.name, options.crs_override,
-               on_globe ? CrsNeed::kRequired : CrsNeed::kOptional);
-    require_earth(crs, path, options.placing);
-    impl->place_in_plane(crs);
-    require_degrees(impl->info, crs, path, options.crs_override);
-    impl->take_heights(crs);
-    if (on_globe) impl->place_on_globe(crs);
+  try {
+    impl->open(path, options);
+  } catch (const std::runtime_error& error) {
+    // GDAL and PROJ pass on an allocation that failed as whatever they could not find or make.
+    if (!quiet.lacks_memory()) throw;
+    const std::string said = error.what();
+    throw IoError("cannot open the raster", path,
+                  "out of memory (" + said.substr(0, said.find('\n')) + ")", kNoMemoryRemedy);
   }
-  describe_blocks(*impl->band, impl->rule.has_mask, impl->info);
-  // In a plane it may be of another world.
-  if (options.tally && impl->is_of_earth) {
-    impl->watch.emplace(options.tally, options.number, impl->rule, impl->info,
-                        impl->height_options);
-  }
-  impl->reader.emplace(*impl->band, impl->rule.has_mask, impl->info, options.cache, options.number,
-                       impl->watch ? &*impl->watch : nullptr);
-  impl->watches_reads = impl->watch && !options.cache;
-  if (impl->grid) impl->note_unplaced();
   return std::unique_ptr<RasterSource>(new RasterSource(std::move(impl)));
 }
 

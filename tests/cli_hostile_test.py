@@ -280,6 +280,14 @@ class CliHostile(unittest.TestCase):
                     if done.returncode in (1, 2):
                         self.assertRegex(done.said, "(?m)^qmpipe: .*(memory|MiB|thread|resource)")
 
+    def test_a_lost_database_of_projections_is_not_the_rasters_fault(self):
+        lost = {**os.environ, "PROJ_LIB": str(self.place), "PROJ_DATA": str(self.place)}
+        for line in (["build", self.dem, "--dry-run"], ["verify", self.tiles, "--source", self.dem]):
+            done = run(*line, env=lost)
+            self.assertEqual(done.returncode, 1, done.said)
+            self.assertRegex(done.said, "(?m)^qmpipe: .*proj.db")
+            self.assertNotIn("--source-crs", done.said)
+
     def test_the_default_of_threads_is_what_the_process_may_use(self):
         one = min(os.sched_getaffinity(0))
         done = run("build", self.dem, "--dry-run", "-v",
