@@ -5,26 +5,20 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 
 #include "formats/gdal_session.h"
+#include "formats/letter_case.h"
 
 namespace qmpipe {
 namespace {
 
 constexpr std::size_t kLongestText = 65536;
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
-
 // PROJ's ways to other files: grids of a datum shift, tables of definitions, files of parameters.
 bool names_files(const std::string& text) {
   static constexpr std::array<const char*, 5> kWays = {
       "grids=", "init=", "file=", "catalog=", "parameterfile"};
-  const std::string words = lower(text);
+  const std::string words = lower_case(text);
   return std::any_of(kWays.begin(), kWays.end(),
                      [&words](const char* way) { return words.find(way) != std::string::npos; });
 }

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <span>
 
 #include "formats/height_unit.h"
+#include "formats/letter_case.h"
 
 namespace qmpipe {
 namespace {
@@ -44,17 +44,11 @@ bool is_about_heights(const std::string& name) {
   return has_any(name, kWords);
 }
 
-std::string item(GDALRasterBand& band, const char* name) {
-  const char* const text = band.GetMetadataItem(name);
-  return lower_case(text != nullptr ? text : "");
-}
-
 }  // namespace
 
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
+std::string lower_item(GDALRasterBand& band, const char* name) {
+  const char* const text = band.GetMetadataItem(name);
+  return lower_case(text != nullptr ? text : "");
 }
 
 bool is_depth_name(const std::string& standard_name) {
@@ -63,7 +57,7 @@ bool is_depth_name(const std::string& standard_name) {
 }
 
 HeightClaim height_claim_of(GDALRasterBand& band, const std::string& name) {
-  const std::string standard_name = item(band, "standard_name");
+  const std::string standard_name = lower_item(band, "standard_name");
   const std::string own_name = lower_case(name.substr(name.find_last_of(":/") + 1));
   const std::string unit = band.GetUnitType() != nullptr ? band.GetUnitType() : "";
   HeightClaim claim;

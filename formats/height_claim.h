@@ -18,6 +18,7 @@ struct HeightClaim {
 // `name`: of the subdataset, such as NETCDF:"a.nc":elevation.
 HeightClaim height_claim_of(GDALRasterBand& band, const std::string& name);
 
-std::string lower_case(std::string text);
+// An item of the band's metadata in lower case, empty where it has none.
+std::string lower_item(GDALRasterBand& band, const char* name);
 
 }  // namespace qmpipe

@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <string_view>
 #include <system_error>
 #include <utility>
+
+#include "formats/letter_case.h"
 
 namespace qmpipe {
 namespace {
@@ -124,13 +125,16 @@ Result<HeightEncoding> height_encoding_named(const std::string& name) {
 
 std::string option_name(const std::string& option) { return option.substr(0, option.find('=')); }
 
+bool has_option(const std::vector<std::string>& options, const std::string& name) {
+  return std::any_of(options.begin(), options.end(),
+                     [&name](const std::string& option) { return option_name(option) == name; });
+}
+
 bool is_secret(const std::string& option) {
   static constexpr std::array<const char*, 14> kWords = {
-      "KEY", "SECRET",    "TOKEN",      "PASS", "PWD",        "AUTH",   "COOKIE",
-      "SAS", "SIGNATURE", "CREDENTIAL", "USER", "CONNECTION", "HEADER", "ACCOUNT"};
-  std::string name = option_name(option);
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+      "key", "secret",    "token",      "pass", "pwd",        "auth",   "cookie",
+      "sas", "signature", "credential", "user", "connection", "header", "account"};
+  const std::string name = lower_case(option_name(option));
   return std::any_of(kWords.begin(), kWords.end(),
                      [&name](const char* word) { return name.find(word) != std::string::npos; });
 }

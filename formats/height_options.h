@@ -60,6 +60,7 @@ Result<HeightEncoding> height_encoding_named(const std::string& name);
 
 // Of a text NAME=VALUE, or NAME alone.
 std::string option_name(const std::string& option);
+bool has_option(const std::vector<std::string>& options, const std::string& name);
 // By its name: what is worth keeping out of files and messages.
 bool is_secret(const std::string& option);
 

@@ -87,12 +87,8 @@ void take_unit(GDALRasterBand& band, const RasterCrs& crs, RuledHeights& heights
 // What says that the numbers are depths; empty: nothing does.
 std::string reason_for_depths(GDALRasterBand& band, const std::string& driver,
                               const RasterCrs& crs) {
-  const auto item = [&band](const char* name) {
-    const char* const text = band.GetMetadataItem(name);
-    return lower_case(text != nullptr ? text : "");
-  };
-  const std::string positive = item("positive");
-  const std::string name = item("standard_name");
+  const std::string positive = lower_item(band, "positive");
+  const std::string name = lower_item(band, "standard_name");
   if (positive == "down") return "its attribute 'positive' is 'down'";
   if (positive == "up") return "";
   if (is_depth_name(name)) return "its standard_name is '" + name + "'";

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -11,6 +10,7 @@
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
+#include "formats/letter_case.h"
 #include "formats/little_endian.h"
 #include "scheduler/check.h"
 
@@ -244,9 +244,7 @@ void check_mesh(const ExportMesh& mesh) {
 }  // namespace
 
 MeshFormat mesh_format_of(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(path.extension().string());
   if (extension == ".ply") return MeshFormat::kPly;
   if (extension == ".obj") return MeshFormat::kObj;
   if (extension == ".glb") return MeshFormat::kGlb;

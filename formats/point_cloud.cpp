@@ -13,6 +13,7 @@
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/las_file.h"
+#include "formats/letter_case.h"
 #include "formats/point_crs.h"
 #include "formats/point_grid.h"
 #include "formats/point_text.h"
@@ -42,11 +43,7 @@ constexpr int kLeastDecimalsOfDegrees = 7;
          "unpack it with: laszip -i IN.laz -o OUT.las, or: pdal translate IN.laz OUT.las");
 }
 
-std::string extension_of(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
+std::string extension_of(const fs::path& path) { return lower_case(path.extension().string()); }
 
 bool is_text_name(const std::string& extension) {
   return extension == ".xyz" || extension == ".csv" || extension == ".txt";

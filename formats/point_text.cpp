@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <system_error>
 #include <utility>
+
+#include "formats/letter_case.h"
 
 namespace qmpipe {
 namespace {
@@ -82,10 +83,7 @@ std::optional<std::size_t> axis_of(std::string_view name) {
       {"y", "northing", "north", "lat", "latitude"},
       {"z", "height", "elevation", "alt", "altitude"},
   }};
-  std::string lower;
-  for (const char c : name) {
-    lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  }
+  const std::string lower = lower_case(name);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto& names = kNames[axis];
     if (std::find(names.begin(), names.end(), lower) != names.end()) return axis;

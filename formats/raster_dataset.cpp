@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <filesystem>
 #include <optional>
 #include <utility>
@@ -16,6 +15,7 @@
 #include "formats/gdal_session.h"
 #include "formats/height_claim.h"
 #include "formats/height_options.h"
+#include "formats/letter_case.h"
 
 namespace qmpipe {
 namespace {
@@ -32,10 +32,7 @@ Dataset try_open(const std::string& name, const std::vector<std::string>& open_o
 }
 
 std::string lower_extension(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
+  return lower_case(std::filesystem::path(path).extension().string());
 }
 
 // Files that stand beside a raster; some drivers would open them as one.
@@ -163,6 +160,7 @@ void place_by_axes(OpenedRaster& opened) {
   if (!array || array->GetDimensionCount() != 2) return;
   Dataset placed(array->AsClassicDataset(1, 0));
   if (!placed || placed->GetRasterCount() != 1 || !has_geotransform(*placed)) return;
+  opened.earlier_files = files_of(opened);
   opened.dataset = std::move(placed);
 }
 
@@ -186,10 +184,7 @@ void note_open_options(const std::vector<std::string>& open_options, OpenedRaste
 void note_finer_grid(const std::vector<std::string>& open_options, OpenedRaster& opened) {
   const char* const finer = opened.dataset->GetMetadataItem("HAS_SUPERGRIDS");
   if (finer == nullptr || std::string(finer) != "TRUE") return;
-  if (std::any_of(open_options.begin(), open_options.end(),
-                  [](const std::string& option) { return option_name(option) == "MODE"; })) {
-    return;
-  }
+  if (has_option(open_options, "MODE")) return;
   const char* const cell = opened.dataset->GetMetadataItem("MIN_RESOLUTION_X");
   opened.assumptions.push_back(
       fmt::format("it has grids of finer resolution, and the coarse one is taken; for cells of {} "
@@ -216,6 +211,13 @@ bool has_geotransform(GDALDataset& dataset) {
          g != std::array<double, 6>{0, 1, 0, 0, 0, 1};
 }
 
+std::vector<std::string> files_of(const OpenedRaster& opened) {
+  std::vector<std::string> files = opened.earlier_files;
+  const CPLStringList own(opened.dataset->GetFileList());
+  for (int k = 0; k < own.size(); ++k) files.emplace_back(own[k]);
+  return files;
+}
+
 OpenedRaster open_dataset(const std::string& path, const std::vector<std::string>& open_options) {
   require_no_stream(path);
   GdalSession session;
@@ -238,8 +240,6 @@ OpenedRaster open_dataset(const std::string& path, const std::vector<std::string
   if (const GDALDriver* driver = opened.dataset->GetDriver()) {
     opened.driver = driver->GetDescription();
   }
-  const CPLStringList files(opened.dataset->GetFileList());
-  for (int k = 0; k < files.size(); ++k) opened.files.emplace_back(files[k]);
   note_open_options(open_options, opened);
   note_finer_grid(open_options, opened);
   if (is_netcdf(*opened.dataset) && !has_geotransform(*opened.dataset) &&

@@ -18,13 +18,17 @@ struct OpenedRaster {
   std::unique_ptr<GDALDataset, CloseDataset> dataset;  // has at least one band
   std::string name;  // what was opened in the end, e.g. "/vsizip/a.zip/dem.asc"
   std::string driver;
-  std::vector<std::string> files;  // that GDAL knows to belong to it
+  // Of the dataset that it was opened as first, where another one reads it.
+  std::vector<std::string> earlier_files;
   std::vector<std::string> assumptions;
 };
 
 bool is_netcdf(GDALDataset& dataset);
 // Another one than the picture's own pixels.
 bool has_geotransform(GDALDataset& dataset);
+
+// That GDAL knows to belong to it.
+std::vector<std::string> files_of(const OpenedRaster& opened);
 
 // `open_options`: NAME=VALUE for the driver. Throws IoError with the remedy. REQUIRES: a GdalSession on
 // this thread.

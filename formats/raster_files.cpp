@@ -30,10 +30,11 @@ using FilesByPath = std::map<std::string, RasterFile>;
 void collect(const std::string& path, const std::vector<std::string>& open_options,
              FilesByPath& files) {
   const OpenedRaster opened = open_dataset(path, open_options);
-  if (opened.files.empty()) {
+  const std::vector<std::string> names = files_of(opened);
+  if (names.empty()) {
     if (const auto file = describe_file(path)) files.emplace(path, *file);
   }
-  for (const std::string& name : opened.files) {
+  for (const std::string& name : names) {
     const auto file = describe_file(name);
     if (!file) continue;
     const bool is_new = files.emplace(name, *file).second;

@@ -21,6 +21,8 @@ constexpr double kLargestLatitudeDeg = 100;
 constexpr double kLeastEarthRadiusM = 6.3e6;
 constexpr double kLargestEarthRadiusM = 6.45e6;
 
+constexpr char kWriteBounds[] =
+    "write the bounds into it: gdal_translate -a_ullr WEST NORTH EAST SOUTH FILE NEW.tif";
 // Without axes GDAL can but guess.
 constexpr char kNetcdfRows[] =
     " (where the first row is the northernmost, and not the southernmost as GDAL takes it: "
@@ -56,9 +58,7 @@ std::optional<PixelPlane> plane_of(GDALDataset& dataset, const std::string& path
     if (need == CrsNeed::kOptional) return std::nullopt;
     throw IoError("cannot place the raster", path,
                   "it has no geotransform: nothing says where its pixels lie",
-                  std::string("write the bounds into it: gdal_translate -a_ullr WEST NORTH EAST "
-                              "SOUTH FILE NEW.tif") +
-                      (is_netcdf(dataset) ? kNetcdfRows : ""));
+                  std::string(kWriteBounds) + (is_netcdf(dataset) ? kNetcdfRows : ""));
   }
   const PixelPlane plane{.x0 = g[0],
                          .x_per_column = g[1],
@@ -70,8 +70,7 @@ std::optional<PixelPlane> plane_of(GDALDataset& dataset, const std::string& path
   if (!std::isfinite(area) || area == 0 || !std::isfinite(g[0]) || !std::isfinite(g[3])) {
     throw IoError("cannot place the raster", path,
                   fmt::format("its geotransform ({}) cannot be inverted", fmt::join(g, ", ")),
-                  "write the bounds into it: gdal_translate -a_ullr WEST NORTH EAST SOUTH FILE "
-                  "NEW.tif");
+                  kWriteBounds);
   }
   return plane;
 }

@@ -34,7 +34,6 @@ struct RasterSource::Impl {
   std::optional<HeightWatch> watch;
   std::optional<RasterReader> reader;
   // Without a cache every read is taken for a new block.
-  bool is_of_earth = true;
   bool watches_reads = false;
   std::int64_t reads = 0;
   // Kept between reads.
@@ -55,6 +54,7 @@ void RasterSource::Impl::describe(const std::string& path) {
   height_band = height_band_of(opened, path, height_options);
   band = height_band.band;
   info.path = path;
+  info.opened_name = opened.name;
   info.driver = opened.driver;
   info.width = dataset.GetRasterXSize();
   info.height = dataset.GetRasterYSize();
@@ -82,7 +82,6 @@ void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
 }
 
 void RasterSource::Impl::take_heights(const RasterCrs& crs) {
-  is_of_earth = is_of_earth_size(crs);
   RuledHeights heights = height_rule_of(*band, info.driver, crs, height_options);
   rule = std::move(heights.rule);
   info.unit = std::move(heights.unit);
@@ -149,9 +148,12 @@ RasterSource::~RasterSource() = default;
 const RasterInfo& RasterSource::info() const { return impl_->info; }
 
 void RasterSource::Impl::open(const std::string& path, const OpenOptions& options) {
-  opened = open_dataset(path, options.heights.open_options);
+  opened = open_dataset(options.opened_name.empty() ? path : options.opened_name,
+                        options.heights.open_options);
   height_options = options.heights;
   describe(path);
+  // What was placed on the globe is.
+  bool is_of_earth = true;
   if (options.placement) {
     info.placement = options.placement;
     place_in_plane(options.placement->crs);
@@ -162,6 +164,7 @@ void RasterSource::Impl::open(const std::string& path, const OpenOptions& option
     const RasterCrs crs = crs_of(*opened.dataset, path, opened.name, options.crs_override,
                                  on_globe ? CrsNeed::kRequired : CrsNeed::kOptional);
     require_earth(crs, path, options.placing);
+    is_of_earth = is_of_earth_size(crs);
     place_in_plane(crs);
     require_degrees(info, crs, path, options.crs_override);
     take_heights(crs);

@@ -26,6 +26,8 @@ namespace qmpipe {
 
 struct RasterInfo : GridInfo {
   std::string path;
+  // What was opened in the end: of a file with several grids or an archive the one that is read.
+  std::string opened_name;
   std::string driver;
   std::string crs_name;
   std::string crs_wkt;  // of x and y; empty: unknown
@@ -77,6 +79,8 @@ struct OpenOptions {
   // The same for all handles on one file in one cache, and different for every file.
   std::uint32_t number = 0;
   Placing placing = Placing::kGlobe;
+  // The opened_name of an earlier opening: nothing is searched again. DEFAULT: empty, by the path.
+  std::string opened_name = {};
   // What an earlier opening of the same raster found out, with the same crs_override. The raster is
   // then opened to be read only: nothing is found out about its place. DEFAULT: none.
   std::shared_ptr<const RasterPlacement> placement = {};

@@ -49,6 +49,7 @@ std::unique_ptr<RasterSource> SourcePool::open(std::size_t number) const {
   const RasterInfo& info = this->info(number);
   OpenOptions options = options_;
   options.number = static_cast<std::uint32_t>(number);
+  options.opened_name = info.opened_name;
   options.placement = info.placement;
   std::unique_ptr<RasterSource> source = RasterSource::open(info.path, options);
   if (!is_the_same(source->info(), info)) {

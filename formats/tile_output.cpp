@@ -1,13 +1,13 @@
 #include "formats/tile_output.h"
 
 #include <algorithm>
-#include <cctype>
 #include <string>
 #include <system_error>
 
 #include "formats/errors.h"
 #include "formats/file_bytes.h"
 #include "formats/folder_sink.h"
+#include "formats/letter_case.h"
 #include "formats/mbtiles.h"
 
 namespace qmpipe {
@@ -26,9 +26,7 @@ namespace {
 }  // namespace
 
 TileForm form_of(const std::filesystem::path& output) {
-  std::string extension = output.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(output.extension().string());
   if (extension == ".mbtiles") return TileForm::kMbtiles;
   if (extension == ".pmtiles") return TileForm::kPmtiles;
   return TileForm::kFolder;

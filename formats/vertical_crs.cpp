@@ -3,11 +3,11 @@
 #include <proj.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <memory>
 
 #include "formats/free_with.h"
+#include "formats/letter_case.h"
 
 namespace qmpipe {
 namespace {
@@ -15,10 +15,8 @@ namespace {
 using ProjContext = std::unique_ptr<PJ_CONTEXT, FreeWith<proj_context_destroy>>;
 using ProjObject = std::unique_ptr<PJ, FreeWith<proj_destroy>>;
 
-bool names_ellipsoid(std::string name) {
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return name.find("ellipsoid") != std::string::npos;
+bool names_ellipsoid(const std::string& name) {
+  return lower_case(name).find("ellipsoid") != std::string::npos;
 }
 
 // Without the transformation to WGS84 that it may be bound to.

@@ -6,6 +6,7 @@
 #include <cctype>
 
 #include "formats/gzip.h"
+#include "formats/letter_case.h"
 #include "formats/tile_set.h"
 
 namespace qmpipe {

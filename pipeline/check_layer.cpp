@@ -6,6 +6,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "formats/letter_case.h"
 #include "pipeline/check_available.h"
 #include "pipeline/http_answer.h"
 #include "scheduler/check.h"

@@ -7,6 +7,7 @@
 #include <limits>
 #include <span>
 
+#include "formats/letter_case.h"
 #include "scheduler/check.h"
 #include "stages/geodesy.h"
 

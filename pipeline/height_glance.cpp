@@ -17,6 +17,7 @@ constexpr std::size_t kKeptEachWay = 8;
 struct Seen {
   TileKey key;
   HeightSpan heights;
+  std::vector<TileKey> children;  // that are there
 };
 
 std::span<const TileKey> tiles_of_zoom(const std::vector<TileKey>& keys, std::int32_t zoom) {
@@ -40,6 +41,16 @@ std::vector<TileKey> first_tiles(const std::vector<TileKey>& keys) {
   return chosen;
 }
 
+std::vector<TileKey> children_there(const std::vector<TileKey>& keys, const TileKey& parent) {
+  std::vector<TileKey> children;
+  for (const std::int32_t k : {0, 1, 2, 3}) {
+    const TileKey child = {
+        .zoom = parent.zoom + 1, .x = 2 * parent.x + k % 2, .y = 2 * parent.y + k / 2};
+    if (std::binary_search(keys.begin(), keys.end(), child)) children.push_back(child);
+  }
+  return children;
+}
+
 std::vector<Seen> look_at(const TileSet& tile_set, const std::vector<TileKey>& keys) {
   std::vector<Seen> seen;
   for (const TileKey& key : keys) {
@@ -51,19 +62,10 @@ std::vector<Seen> look_at(const TileSet& tile_set, const std::vector<TileKey>& k
     if (!mesh) continue;
     seen.push_back({.key = key,
                     .heights = {.low_m = static_cast<double>(mesh->header.min_height_m),
-                                .high_m = static_cast<double>(mesh->header.max_height_m)}});
+                                .high_m = static_cast<double>(mesh->header.max_height_m)},
+                    .children = children_there(tile_set.keys(), key)});
   }
   return seen;
-}
-
-std::vector<TileKey> children_there(const std::vector<TileKey>& keys, const TileKey& parent) {
-  std::vector<TileKey> children;
-  for (const std::int32_t k : {0, 1, 2, 3}) {
-    const TileKey child = {
-        .zoom = parent.zoom + 1, .x = 2 * parent.x + k % 2, .y = 2 * parent.y + k / 2};
-    if (std::binary_search(keys.begin(), keys.end(), child)) children.push_back(child);
-  }
-  return children;
 }
 
 // The highest and the lowest, each once. Equal ones by their keys.
@@ -92,28 +94,20 @@ std::optional<HeightSpan> glance_at_heights(const TileSet& tile_set) {
   const std::vector<TileKey>& keys = tile_set.keys();
   if (keys.empty()) return std::nullopt;
   std::optional<HeightSpan> range;
-  const auto include = [&range](const HeightSpan& heights) {
-    if (range) {
-      range->include(heights);
-    } else {
-      range = heights;
-    }
-  };
   std::vector<Seen> seen = look_at(tile_set, first_tiles(keys));
   while (!seen.empty()) {
     std::vector<TileKey> next;
     std::vector<Seen> with_children;
     for (const Seen& tile : seen) {
       // A coarser zoom's heights are as far off as its tolerance allows: only what nothing replaces counts.
-      if (children_there(keys, tile.key).empty()) {
-        include(tile.heights);
+      if (tile.children.empty()) {
+        include(range, tile.heights);
       } else {
         with_children.push_back(tile);
       }
     }
     for (const Seen& tile : outstanding(std::move(with_children))) {
-      const std::vector<TileKey> children = children_there(keys, tile.key);
-      next.insert(next.end(), children.begin(), children.end());
+      next.insert(next.end(), tile.children.begin(), tile.children.end());
     }
     seen = look_at(tile_set, next);
   }

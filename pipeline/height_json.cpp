@@ -43,6 +43,14 @@ void read_options(const json& object, const char* name, std::vector<std::string>
   }
 }
 
+template <class Value>
+auto from_text(Result<Value> (*named)(const std::string&)) {
+  return [named](const json& value) -> Result<Value> {
+    if (!value.is_string()) return Error{"it is no text"};
+    return named(value.get<std::string>());
+  };
+}
+
 Result<std::int32_t> band_number(const json& value) {
   if (!value.is_number_integer() || value.get<double>() > 65535) return Error{"it is no band"};
   return value.get<std::int32_t>();
@@ -80,21 +88,9 @@ Result<HeightOptions> parse_heights(const std::string& text) {
   if (!object.is_object()) return Error{"the recipe's \"heights\" is no JSON object"};
   HeightOptions heights;
   std::string problem;
-  read_named(
-      object, "void",
-      [](const json& value) -> Result<VoidValues> {
-        if (!value.is_string()) return Error{"it is no text"};
-        return void_values_named(value.get<std::string>());
-      },
-      heights.voids, problem);
+  read_named(object, "void", from_text(void_values_named), heights.voids, problem);
   read_named(object, "band", band_number, heights.band, problem);
-  read_named(
-      object, "encoding",
-      [](const json& value) -> Result<HeightEncoding> {
-        if (!value.is_string()) return Error{"it is no text"};
-        return height_encoding_named(value.get<std::string>());
-      },
-      heights.encoding, problem);
+  read_named(object, "encoding", from_text(height_encoding_named), heights.encoding, problem);
   read_options(object, "oo", heights.open_options, problem);
   read_options(object, "config", heights.config, problem);
   read_named(object, "z-scale", number, heights.z_scale, problem);

@@ -17,12 +17,4 @@ std::vector<std::string> HttpAnswer::all_headers(std::string_view name) const {
   return values;
 }
 
-std::string lower_case(std::string_view text) {
-  std::string lower(text);
-  for (char& c : lower) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return lower;
-}
-
 }  // namespace qmpipe

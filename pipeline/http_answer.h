@@ -48,7 +48,4 @@ struct HttpAnswer {
 // The error says in words why there is no answer: "cannot connect: connection refused".
 using Fetch = std::function<Result<HttpAnswer>(const HttpQuestion&)>;
 
-// "Gzip" as "gzip": ASCII only, as HTTP compares names.
-std::string lower_case(std::string_view text);
-
 }  // namespace qmpipe

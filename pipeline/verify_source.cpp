@@ -57,11 +57,7 @@ class SurveyedPosts final : public SourcePosts {
       if (found == tiles.end() || found->key != near) continue;
       const HeightSpan own = {.low_m = static_cast<double>(found->lowest_m),
                               .high_m = static_cast<double>(found->highest_m)};
-      if (heights) {
-        heights->include(own);
-      } else {
-        heights = own;
-      }
+      include(heights, own);
     }
     return heights ? heights->range_m() : 0;
   }
@@ -160,11 +156,7 @@ class SampledPosts final : public SourcePosts {
 void note_untold(const HeightOptions& given, const std::vector<std::string>& names,
                  Progress& progress) {
   for (const std::string& name : names) {
-    const auto is_it = [&name](const std::string& option) { return option_name(option) == name; };
-    if (std::any_of(given.config.begin(), given.config.end(), is_it) ||
-        std::any_of(given.open_options.begin(), given.open_options.end(), is_it)) {
-      continue;
-    }
+    if (has_option(given.config, name) || has_option(given.open_options, name)) continue;
     progress.note(
         fmt::format("the set was built with a value for {0} that it does not tell: give the same "
                     "--config or --oo {0}=VALUE here, or heights may differ",

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "formats/letter_case.h"
 #include "pipeline/http_answer.h"
 #include "scheduler/check.h"
 

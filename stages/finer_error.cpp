@@ -126,9 +126,7 @@ ErrorSummary TileSurface::error(std::int32_t zoom, const PostWindow& window,
   for (std::size_t k = 0; k < surface_m.size(); ++k) {
     if (std::isnan(heights_m[k]) || std::isnan(surface_m[k])) continue;
     const double error_m = std::abs(surface_m[k] - static_cast<double>(heights_m[k]));
-    ++summary.posts;
-    summary.sum_m += error_m;
-    summary.sum_of_squares_m2 += error_m * error_m;
+    summary.count(error_m);
     summary.largest_m = std::max(summary.largest_m, error_m);
   }
   summary.largest_in_place_m = summary.largest_m;

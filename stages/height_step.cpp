@@ -46,6 +46,14 @@ void HeightSpan::include(const HeightSpan& other) {
   high_m = std::max(high_m, other.high_m);
 }
 
+void include(std::optional<HeightSpan>& all, const HeightSpan& other) {
+  if (all) {
+    all->include(other);
+  } else {
+    all = other;
+  }
+}
+
 double least_tolerance_m(double largest_range_m, double reach_m) {
   const double least_m = finest_step_m(largest_range_m, reach_m);
   double digit = 1e-7;

@@ -5,6 +5,8 @@
 // chooses by its own range, so that a zoom with one mountain does not coarsen its plains.
 #pragma once
 
+#include <optional>
+
 #include "formats/result.h"
 
 namespace qmpipe {
@@ -20,6 +22,9 @@ struct HeightSpan {
   void include(const HeightSpan& other);
   friend bool operator==(const HeightSpan&, const HeightSpan&) = default;
 };
+
+// The other's too; none: it alone.
+void include(std::optional<HeightSpan>& all, const HeightSpan& other);
 
 // A tile's steps. Guarantee: side_m is inner_m times parts.
 struct HeightSteps {

@@ -93,9 +93,7 @@ ErrorSummary measure(const PostGrid& grid, const Surface& surface, std::span<con
   for (std::size_t k = 0; k < heights.size(); ++k) {
     if (valid[k] == 0 || std::isnan(heights[k])) continue;
     const double error_m = std::abs(heights[k] - static_cast<double>(heights_m[k]));
-    ++summary.posts;
-    summary.sum_m += error_m;
-    summary.sum_of_squares_m2 += error_m * error_m;
+    summary.count(error_m);
     if (error_m > summary.largest_m) {
       summary.largest_m = error_m;
       const auto post = static_cast<std::int32_t>(k);
@@ -106,6 +104,12 @@ ErrorSummary measure(const PostGrid& grid, const Surface& surface, std::span<con
 }
 
 }  // namespace
+
+void ErrorSummary::count(double error_m) {
+  ++posts;
+  sum_m += error_m;
+  sum_of_squares_m2 += error_m * error_m;
+}
 
 void ErrorSummary::add(const ErrorSummary& other) {
   if (other.largest_m > largest_m) {

@@ -22,6 +22,8 @@ struct ErrorSummary {
   double sum_of_squares_m2 = 0;
   Post worst;  // of the grid, where largest_m was found first (lowest index)
 
+  // One more post, this far off. Whether it is the worst is left to the caller, which knows the place.
+  void count(double error_m);
   void add(const ErrorSummary& other);
   double mean_m() const;
   double rms_m() const;

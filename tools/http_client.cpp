@@ -11,6 +11,7 @@
 #include <new>
 #include <string_view>
 
+#include "formats/letter_case.h"
 #include "pipeline/progress.h"
 #include "pipeline/version.h"
 #include "scheduler/check.h"

@@ -23,6 +23,14 @@ void add_input_options(CLI::App& command, PyramidArguments& arguments) {
       ->type_name("CRS");
   add_height_options(command, arguments.heights);
   add_height_guard(command, arguments.heights);
+  command
+      .add_option(
+          "--nodata", arguments.voids,
+          "The ground where there are no data: pull (one surface for all zooms, fading to 0 m over "
+          "about four times the height of the data's rim), pull=D (over D metres), height=H (H "
+          "metres at once) or omit (as pull, without tiles that have a void, where the format "
+          "allows)")
+      ->capture_default_str();
   begin_group(command, kQualityGroup);
   command
       .add_option("--resampling", arguments.resampling,
@@ -34,15 +42,6 @@ void add_input_options(CLI::App& command, PyramidArguments& arguments) {
                   "How a coarser zoom is made: mean, subsample, max (shoal-biased) or min")
       ->capture_default_str()
       ->check(CLI::IsMember({"mean", "subsample", "max", "min"}));
-  begin_group(command, kInputGroup);
-  command
-      .add_option(
-          "--nodata", arguments.voids,
-          "The ground where there are no data: pull (one surface for all zooms, fading to 0 m over "
-          "about four times the height of the data's rim), pull=D (over D metres), height=H (H "
-          "metres at once) or omit (as pull, without tiles that have a void, where the format "
-          "allows)")
-      ->capture_default_str();
 }
 
 void add_mesh_options(CLI::App& command, PyramidArguments& arguments) {
@@ -65,8 +64,7 @@ void add_mesh_options(CLI::App& command, PyramidArguments& arguments) {
       .add_option("--tolerance", arguments.tolerance_m,
                   "Largest vertical error at zoom 0 in metres; halved at each deeper zoom "
                   "(default: 15000). For greedy and for edge-collapse with --stop tolerance; with "
-                  "the others it "
-                  "sets how fine heights are")
+                  "the others it sets how fine heights are")
       ->type_name("M");
   command
       .add_option("--tolerance-at", arguments.tolerances,

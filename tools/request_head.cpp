@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "formats/letter_case.h"
 #include "pipeline/http_answer.h"
 #include "scheduler/check.h"
 

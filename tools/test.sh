@@ -150,12 +150,13 @@ PYTHON
 start_tidy() {
   tidy >build/tidy.log 2>&1 </dev/null &
   tidy_process=$!
-  trap 'kill "$tidy_process" 2>/dev/null || true' EXIT
+  trap 'pkill -P "$tidy_process" 2>/dev/null || true; kill "$tidy_process" 2>/dev/null || true' EXIT
 }
 
 finish_tidy() {
   local status=0
   wait "$tidy_process" || status=1
+  trap - EXIT
   cat build/tidy.log
   return $status
 }
