@@ -16,6 +16,7 @@
 #include "formats/tile_output.h"
 #include "pipeline/block_cover.h"
 #include "pipeline/build_plan.h"
+#include "pipeline/data_cover.h"
 #include "pipeline/fingerprint.h"
 #include "pipeline/forecast.h"
 #include "pipeline/keep_survey.h"
@@ -127,6 +128,9 @@ LayerJson layer_for(const BuildOptions& options, const Survey& survey, const Bui
   layer.bounds_deg = united_bounds(survey.sources);
   for (const auto& keys : plan.keys) layer.available.push_back(merge_ranges(keys));
   layer.qmpipe_json = write_recipe(plan.recipe);
+  if (const auto cover = data_cover(survey)) {
+    layer.qmpipe_json = with_cover(layer.qmpipe_json, *cover);
+  }
   return layer;
 }
 

@@ -9,7 +9,7 @@ import assert from 'node:assert/strict';
 import { mkdirSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { boundsOfRanges, extentOf, rangeOverExtent } from '../../tools/viewer/data_extent.js';
+import { boundsOfRanges, coverOf, extentOf, rangeOverExtent } from '../../tools/viewer/data_extent.js';
 import { defaultRampKind, roundDown } from '../../tools/viewer/terrain_style.js';
 import { launch, openPage, qmpipe, waitForTiles, withServer } from './browser.mjs';
 
@@ -86,8 +86,37 @@ test('bounds of layer.json are taken where they tell where the data are', () => 
   assert.deepEqual(extentOf({ bounds: [6, 43, 8, 45], available }), [6, 43, 8, 45]);
   assert.deepEqual(extentOf({ bounds: [170, -20, -170, -10] }), [170, -20, 190, -10]);
   assert.deepEqual(extentOf({ bounds: [-180, -30, 180, -10], available }), [90, -30, 270, -10]);
+  const data = { posts_deg: [100, -29, 200, -11], columns: 51, rows: ['0 51', '3 4'] };
+  assert.deepEqual(extentOf({ bounds: [-180, -30, 180, -10], available, qmpipe: { data } }), [99, -30, 201, -10]);
+  data.posts_deg = [-180, -29, 179, -11];
+  data.columns = 360;
+  assert.deepEqual(extentOf({ bounds: [-180, -30, 180, -10], available, qmpipe: { data } }), [-180, -30, 180, -10]);
   assert.deepEqual(extentOf({ available: [] }, [1, 2, 3, 4]), [1, 2, 3, 4]);
   assert.deepEqual(extentOf({}), [-180, -90, 180, 90]);
+});
+
+test('where the data are, of rows of posts', () => {
+  const data = { posts_deg: [5, 43, 6.5, 44], columns: 4, rows: ['0 4', '1 2', ''] };
+  const flags = (cover) => cover.rows.map((row) => row.join(''));
+  const cover = coverOf({ qmpipe: { data }, projection: 'EPSG:4326' });
+  assert.deepEqual(flags(cover), ['1111', '0110', '0000']);
+  assert.deepEqual([cover.postsDeg, cover.columns], [[5, 43, 6.5, 44], 4]);
+  assert.equal(coverOf({ qmpipe: {} }), null);
+  assert.equal(coverOf({}), null);
+  for (const wrong of [5, [], { rows: 1 }, { ...data, columns: 1e9 }, { ...data, columns: -1 }, { ...data, rows: [] },
+                       { ...data, posts_deg: [1, 2, 'x', 4] }, { ...data, posts_deg: null }]) {
+    assert.equal(coverOf({ qmpipe: { data: wrong } }), null, JSON.stringify(wrong));
+  }
+  assert.deepEqual(flags(coverOf({ qmpipe: { data: { ...data, rows: [null, 'x 1', '9 9 -3 7'] } } })),
+                   ['0000', '0000', '0000']);
+  // Mercator's rows in the south of a tall box are farther apart in degrees than those in the north.
+  const tall = { posts_deg: [0, 0, 1, 80], columns: 1, rows: ['0 1', '', '', '', '', '', '', ''] };
+  const rows = flags(coverOf({ qmpipe: { data: tall }, projection: 'EPSG:3857' }));
+  assert.equal(rows.length, 16);
+  assert.deepEqual(rows, [...Array(rows.lastIndexOf('1') + 1).fill('1'),
+                          ...Array(15 - rows.lastIndexOf('1')).fill('0')]);
+  const edge = 2 * Math.atan(Math.exp(Math.log(Math.tan(Math.PI * 85 / 180)) / 14)) * 180 / Math.PI - 90;
+  assert.equal(rows.lastIndexOf('1'), Math.floor(edge / 80 * 15));
 });
 
 test('a shore where heights lie below 0 m, round lengths, and farther off on narrow screens', () => {
@@ -212,6 +241,43 @@ test('the first view on a telephone of a set across the antimeridian', patience,
     await page.close();
   });
 });
+
+for (const mercator of [false, true]) {
+  test(`holes and corners without data are grey, ${mercator ? 'mercator' : 'geodetic'}`, patience, async () => {
+    const file = join(work, 'holed.asc');
+    const inData = (i, j) => i + j > 40 && Math.hypot(i - 70, j - 50) > 20;
+    const lines = ['ncols 120', 'nrows 100', `xllcorner ${west}`, 'yllcorner 40', 'cellsize 0.1', 'NODATA_value -9999'];
+    for (let j = 0; j < 100; ++j) {
+      lines.push(Array.from({ length: 120 }, (_, i) => (inData(i, j) ? 300 + i + j : -9999)).join(' '));
+    }
+    writeFileSync(file, lines.join('\n') + '\n');
+    const holed = join(work, 'holed');
+    qmpipe('build', file, '-o', holed, '--source-crs', 'EPSG:4326', '--overwrite', '--scheme', mercator ? 'mercator' : 'geodetic');
+    await withServer(holed, async (address) => {
+      const { page, wrong } = await openPage(browser, { width: 640, height: 480 });
+      await page.goto(`${address}?pitch=-90&bare=1`);
+      await waitForTiles(page);
+      const png = await page.screenshot({ path: join(work, 'holed.png') });
+      // Cells at least three from where the data end; each with what is expected there.
+      const cells = [];
+      for (let j = 4; j < 96; j += 7) {
+        for (let i = 4; i < 116; i += 7) {
+          const near = [[0, 0], [3, 0], [-3, 0], [0, 3], [0, -3]].map(([di, dj]) => inData(i + di, j + dj));
+          if (near.every((flag) => flag === near[0])) cells.push([i, j, near[0]]);
+        }
+      }
+      const places = await inPicture(page, cells.map(([i, j]) => [west + (i + 0.5) * 0.1, 50 - (j + 0.5) * 0.1, 300]));
+      const colours = await coloursAt(page, png, places);
+      const without = colours.filter((colour, k) => !cells[k][2]);
+      assert(without.length > 15 && without.length < colours.length / 2);
+      const isBeyond = (colour) => isGrey(colour) && colour[0] < 110;
+      const faults = cells.filter(([, , isData], k) => isBeyond(colours[k]) === isData);
+      assert.deepEqual(faults, [], 'grey where there are no data, and only there');
+      assert.deepEqual(wrong, []);
+      await page.close();
+    });
+  });
+}
 
 test('skirts between tiles are painted like the ground that they hang from', patience, async () => {
   await withServer(set, async (address) => {

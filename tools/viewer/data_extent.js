@@ -2,6 +2,42 @@
 
 const wholeTurn = 360;
 
+// Of a set by qmpipe whose box has holes and corners without data: posts in rows from the south and columns
+// from the west, 1 where the data have a height. Rows are evenly spaced in degrees here. Null: no void.
+export function coverOf(layer) {
+  const data = layer.qmpipe?.data;
+  if (!isCover(data)) return null;
+  const rows = data.rows.map((text) => {
+    const row = new Uint8Array(data.columns);
+    let at = 0;
+    `${text}`.split(' ').forEach((count, turn) => {
+      row.fill(turn % 2, at, at + Number(count));
+      at += Number(count);
+    });
+    return row;
+  });
+  const { posts_deg: postsDeg, columns } = data;
+  if (layer.projection !== 'EPSG:3857' || rows.length < 2) return { postsDeg, columns, rows };
+  const [south, north] = [mercator(postsDeg[1]), mercator(postsDeg[3])];
+  const even = Array.from({ length: 2 * rows.length }, (_, k) => {
+    const latitude = postsDeg[1] + (postsDeg[3] - postsDeg[1]) * k / (2 * rows.length - 1);
+    const row = (mercator(latitude) - south) / (north - south) * (rows.length - 1);
+    return rows[Math.max(0, Math.min(Math.round(row), rows.length - 1))];
+  });
+  return { postsDeg, columns, rows: even };
+}
+
+// Whoever made the set: what is no picture of sensible size is none.
+function isCover(data) {
+  const isCount = (count) => Number.isInteger(count) && count > 0 && count <= 4096;
+  return Array.isArray(data?.rows) && isCount(data.rows.length) && isCount(data.columns) &&
+      Array.isArray(data.posts_deg) && data.posts_deg.length === 4 && data.posts_deg.every(Number.isFinite);
+}
+
+function mercator(latitude) {
+  return Math.log(Math.tan(Math.PI * (latitude + 90) / 360));
+}
+
 function latitudeOfMercatorRow(row, rows) {
   const angle = Math.PI * (2 * row / rows - 1);
   return 2 * Math.atan(Math.exp(angle)) * 180 / Math.PI - 90;
@@ -29,12 +65,18 @@ export function boundsOfRanges(ranges, zoom, isMercator) {
 }
 
 // West, south, east, north in degrees; east is more than 180 across the antimeridian. layer.json's
-// bounds cannot say that: there they go round the whole globe, and the tiles of the deepest zoom that
-// has any tell more.
+// bounds cannot say that: there they go round the whole globe. Where the data are tells more, or the tiles of the
+// deepest zoom that has any.
 export function extentOf(layer, boundsOfTilesDeg) {
   const bounds = layer.bounds || boundsOfTilesDeg || [-180, -90, 180, 90];
   const [west, south, east, north] = bounds.map(Number);
   if (east < west) return [west, south, east + wholeTurn, north];
+  const data = layer.qmpipe?.data;
+  if (isCover(data) && east - west > wholeTurn - 1e-6) {
+    const half = data.columns > 1 ? (data.posts_deg[2] - data.posts_deg[0]) / (data.columns - 1) / 2 : 0;
+    const [first, last] = [data.posts_deg[0] - half, data.posts_deg[2] + half];
+    return last - first < wholeTurn - 1e-6 ? [first, south, last, north] : [west, south, east, north];
+  }
   const available = layer.available || [];
   const zoom = available.findLastIndex((ranges) => ranges.length > 0);
   if (east - west < wholeTurn - 1e-6 || zoom < 0) return [west, south, east, north];

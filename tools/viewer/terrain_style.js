@@ -95,11 +95,44 @@ export function drawLegend(box, ramp) {
   }
 }
 
+// White where the data have a height, black where they have none.
+function paintCover(cover) {
+  const canvas = document.createElement('canvas');
+  canvas.width = cover ? cover.columns : 1;
+  canvas.height = cover ? cover.rows.length : 1;
+  const brush = canvas.getContext('2d');
+  const picture = brush.createImageData(canvas.width, canvas.height);
+  for (let row = 0; row < canvas.height; ++row) {
+    for (let column = 0; column < canvas.width; ++column) {
+      const shade = !cover || cover.rows[canvas.height - 1 - row][column] ? 255 : 0;
+      picture.data.set([shade, shade, shade, 255], 4 * (row * canvas.width + column));
+    }
+  }
+  brush.putImageData(picture, 0, 0);
+  return canvas;
+}
+
+// From angles in radians, east of the extent's west and north of its south, to a place in the cover's
+// picture: two offsets, then two factors. Posts are the middles of its pixels.
+function placeInCover(cover, [west, south]) {
+  if (!cover) return [0.5, 0.5, 0, 0];
+  const axis = (from, first, last, count) => {
+    const factor = last > first ? (count - 1) / count / (last - first) : 0;
+    return [0.5 / count + (from - first) * factor, factor * 180 / Math.PI];
+  };
+  const [[atX, perX], [atY, perY]] = [
+    axis(west, cover.postsDeg[0], cover.postsDeg[2], cover.columns),
+    axis(south, cover.postsDeg[1], cover.postsDeg[3], cover.rows.length)];
+  return [atX, atY, perX, perY];
+}
+
 // A tile's own coordinates run from 0 to 1, so its sides are known. Those of the data's extent are told
 // by distances in metres: from the planes of two meridians, and from two parallels' cones. They are
 // differences from the camera's, which keepExtent() works out in double precision: 32 bits for places on
 // the globe would tear the outline of a set of centimetres.
+const squash = 1 - 0.00669437999014;  // of WGS84: b^2 / a^2
 const source = `
+  const float squash = ${squash};
   float besideLine(float distance_, float largestPixel) {
     float pixel = clamp(fwidth(distance_), 1e-6, largestPixel);
     return 1.0 - smoothstep(0.8, 1.8, abs(distance_) / pixel);
@@ -123,7 +156,16 @@ const source = `
         : (turns > 0.25 ? max(step(0.0, inward_x.x), step(0.0, inward_x.y))
                         : step(0.0, inward_x.x) * step(0.0, inward_x.y));
     float within_y = step(0.0, inward_y.x) * step(0.0, inward_y.y);
-    colour = mix(colour, vec3(0.29, 0.3, 0.31), extent * (1.0 - within_x * within_y));
+    // East of the extent's west and north of its south, in radians, as exact as the distances are.
+    float east = atan(inward_x.x, dot(place, meridians.xy));
+    float north = atan(inward_y.x, squash * parallels.x * axis +
+                                   parallels.y / squash * (eye.w + off_eye.z));
+    vec2 at = coverPlace.xy + coverPlace.zw * vec2(east, north);
+    float turn = czm_twoPi * coverPlace.z;
+    if (turn > 0.0) at.x -= turn * floor((at.x - 0.5) / turn + 0.5);
+    vec2 beyond = abs(at - 0.5);
+    float covered = step(max(beyond.x, beyond.y), 0.5) * step(0.5, texture(cover, clamp(at, 0.0, 1.0)).r);
+    colour = mix(colour, vec3(0.29, 0.3, 0.31), extent * (1.0 - within_x * within_y * covered));
     // Skirts and cliffs that are seen edge-on have pixels of kilometres.
     float largest = 10.0 * czm_metersPerPixel(vec4(-input_.positionToEyeEC, 1.0));
     float sides = max(besideLine(inward_x.x, largest) * step(0.0, dot(place, meridians.xy)),
@@ -138,10 +180,9 @@ const source = `
     return material;
   }`;
 
-export function terrainMaterial(extentDeg) {
+export function terrainMaterial(extentDeg, coverOfData) {
   const { image, low, pivot, high } = rampOf('fixed');
   const [west, south, east, north] = extentDeg.map((degrees) => degrees * Math.PI / 180);
-  const squash = 1 - 0.00669437999014;  // of WGS84: b^2 / a^2
   const parallel = (latitude) => [Math.cos(latitude), squash * Math.sin(latitude)];
   const span = extentDeg[2] - extentDeg[0];
   const vector = (...numbers) => new Cesium.Cartesian4(...numbers);
@@ -153,6 +194,8 @@ export function terrainMaterial(extentDeg) {
         meridians: vector(Math.cos(west), Math.sin(west), Math.cos(east), Math.sin(east)),
         parallels: vector(...parallel(south), ...parallel(north)),
         turns: span >= 360 ? 1 : (span > 180 ? 0.5 : 0),
+        cover: paintCover(coverOfData),
+        coverPlace: vector(...placeInCover(coverOfData, extentDeg)),
         eye: vector(0, 0, 0, 0), eyeInward: vector(0, 0, 0, 0),
       },
       source,
@@ -168,7 +211,7 @@ export function keepExtent(scene, material) {
   scene.preRender.addEventListener(() => {
     const { x, y, z } = scene.camera.positionWC;
     const axis = Math.hypot(x, y);
-    Cesium.Cartesian4.fromElements(x, y, axis, 0, eye);
+    Cesium.Cartesian4.fromElements(x, y, axis, z, eye);
     Cesium.Cartesian4.fromElements(w.x * y - w.y * x, w.w * x - w.z * y, p.x * z - p.y * axis,
                                    p.w * axis - p.z * z, eyeInward);
   });

@@ -6,7 +6,7 @@
 //        ?wireframe=1  ?boundaries=1  ?extent=0  ?ramp=shore|fitted|fixed  switches
 //        ?bare=1  hides the panels and the data's outline
 
-import { extentOf, rangeOverExtent } from './data_extent.js';
+import { coverOf, extentOf, rangeOverExtent } from './data_extent.js';
 import { defaultRampKind, drawLegend, keepExtent, paintSkirtsLikeGround, rampOf, roundDown,
          terrainMaterial } from './terrain_style.js';
 
@@ -75,6 +75,7 @@ async function describeSet(tiles) {
     layer,
     tiles: set.tiles,
     extentDeg: extentOf(layer, set.bounds_deg),
+    cover: coverOf(layer),
     heights: set.heights_m,
     changes: set.layer_changes || [],
   };
@@ -265,7 +266,7 @@ async function show() {
   scene.globe.baseColor = Cesium.Color.fromCssColorString('#303335');
   scene.backgroundColor = Cesium.Color.fromCssColorString('#10151c');
   lightFromNorthWest(scene);
-  const material = terrainMaterial(set.extentDeg);
+  const material = terrainMaterial(set.extentDeg, set.cover);
   scene.globe.material = material;
   keepExtent(scene, material);
   connectSwitches(viewer, material, set);
