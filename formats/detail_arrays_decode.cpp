@@ -11,9 +11,9 @@
 namespace qmpipe {
 namespace {
 
-class Decoder {
+class ArrayDecoder {
  public:
-  explicit Decoder(const DetailArrays& arrays) : arrays_(arrays) {}
+  explicit ArrayDecoder(const DetailArrays& arrays) : arrays_(arrays) {}
 
   Result<DetailBlock> take_block(const DetailBlockSize& size) {
     DetailBlock block;
@@ -119,7 +119,7 @@ Result<DetailModel> decode_detail(const DetailSummary& summary, const DetailArra
                        .interval = summary.interval,
                        .blocks = {},
                        .seams = {}};
-  Decoder decoder(arrays);
+  ArrayDecoder decoder(arrays);
   for (std::size_t b = 0; b < summary.blocks.size(); ++b) {
     auto block = decoder.take_block(summary.blocks[b]);
     if (!block) return Error{fmt::format("its block {}: {}", b, block.error().message)};

@@ -11,7 +11,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::size_t kMostCrsBytes = 65536;
+constexpr std::size_t kMostModelCrsBytes = 65536;
 // No frame of zstd is smaller.
 constexpr std::uint64_t kLeastChunkBytes = 8;
 
@@ -35,7 +35,7 @@ Result<DetailFrame> read_frame(const Hdf5SegmentReader& file) {
 }
 
 Result<DetailSummary> read_summary(const Hdf5SegmentReader& file, std::uint64_t file_bytes) {
-  auto crs_wkt = file.text(kDetailCrs, kMostCrsBytes);
+  auto crs_wkt = file.text(kDetailCrs, kMostModelCrsBytes);
   if (!crs_wkt) return crs_wkt.error();
   const auto frame = read_frame(file);
   if (!frame) return frame.error();
@@ -109,13 +109,13 @@ Result<std::vector<std::uint32_t>> read_array(const std::filesystem::path& path,
   return values;
 }
 
-struct OpenedFile {
+struct OpenedModel {
   Hdf5SegmentReader file;
   DetailSummary summary;
   std::uint64_t bytes;
 };
 
-Result<OpenedFile> open(const std::filesystem::path& path) {
+Result<OpenedModel> open(const std::filesystem::path& path) {
   auto file = Hdf5SegmentReader::open(path, detail_identity());
   if (!file) return file.error();
   std::error_code code;
@@ -123,7 +123,7 @@ Result<OpenedFile> open(const std::filesystem::path& path) {
   if (code) return file->refused(code.message());
   auto summary = read_summary(*file, bytes);
   if (!summary) return summary.error();
-  return OpenedFile{.file = std::move(*file), .summary = std::move(*summary), .bytes = bytes};
+  return OpenedModel{.file = std::move(*file), .summary = std::move(*summary), .bytes = bytes};
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostBytes = 4096;
+constexpr std::size_t kMostLockBytes = 4096;
 const char* const kAtWork = "another run is at work with it";
 
 std::string own_host() {
@@ -30,7 +30,7 @@ std::string own_host() {
 
 // "HOST PID", of a file that may be half written or anybody's; empty when it cannot be read.
 std::string holder_in(const fs::path& path) {
-  const auto bytes = read_file_bytes(path, kMostBytes);
+  const auto bytes = read_file_bytes(path, kMostLockBytes);
   if (!bytes) return "";
   std::string text;
   for (const std::uint8_t byte : *bytes) {

@@ -14,17 +14,12 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::array<std::uint8_t, 8> kMagic = {'Q', 'M', 'P', 'S', 'E', 'A', 'L', '1'};
-constexpr std::uint64_t kSeed = 0x716D706970650001ULL;
+constexpr std::array<std::uint8_t, 8> kSealMagic = {'Q', 'M', 'P', 'S', 'E', 'A', 'L', '1'};
+constexpr std::uint64_t kSealSeed = 0x716D706970650001ULL;
 constexpr std::size_t kWord = sizeof(std::uint64_t);
 constexpr std::size_t kRangeBytes = 2 * kWord;
 // Hash of the parts, bytes before the seal, count, hash of the seal, magic.
 constexpr std::size_t kTailBytes = 5 * kWord;
-
-void append(std::vector<std::uint8_t>& bytes, std::uint64_t value) {
-  bytes.resize(bytes.size() + kWord);
-  store_little_endian(bytes.data() + bytes.size() - kWord, value);
-}
 
 std::vector<ByteRange> outside(std::vector<ByteRange> payload, std::uint64_t file_bytes) {
   std::sort(payload.begin(), payload.end(),
@@ -46,19 +41,19 @@ std::vector<ByteRange> outside(std::vector<ByteRange> payload, std::uint64_t fil
 void append_seal(std::vector<std::uint8_t>& file, std::vector<ByteRange> payload) {
   const std::size_t body_bytes = file.size();
   const std::vector<ByteRange> parts = outside(std::move(payload), body_bytes);
-  std::uint64_t hash = kSeed;
+  std::uint64_t hash = kSealSeed;
   for (const ByteRange& part : parts) {
     hash = hash64(std::span(file).subspan(part.offset, part.bytes), hash);
   }
   for (const ByteRange& part : parts) {
-    append(file, part.offset);
-    append(file, part.bytes);
+    append_little_endian(file, part.offset);
+    append_little_endian(file, part.bytes);
   }
-  append(file, hash);
-  append(file, body_bytes);
-  append(file, parts.size());
-  append(file, hash64(std::span(file).subspan(body_bytes), kSeed));
-  file.insert(file.end(), kMagic.begin(), kMagic.end());
+  append_little_endian(file, hash);
+  append_little_endian(file, body_bytes);
+  append_little_endian(file, parts.size());
+  append_little_endian(file, hash64(std::span(file).subspan(body_bytes), kSealSeed));
+  file.insert(file.end(), kSealMagic.begin(), kSealMagic.end());
 }
 
 std::span<const std::uint8_t> without_seal(std::span<const std::uint8_t> file) {
@@ -79,7 +74,7 @@ std::optional<Error> check_seal(const std::filesystem::path& path) {
   if (file_bytes < kTailBytes) return refused("the file is cut off or was never finished");
   const auto tail = read_file_range(path, file_bytes - kTailBytes, kTailBytes);
   if (!tail) return tail.error();
-  if (!std::equal(kMagic.begin(), kMagic.end(), tail->end() - kMagic.size())) {
+  if (!std::equal(kSealMagic.begin(), kSealMagic.end(), tail->end() - kSealMagic.size())) {
     return refused("the file is cut off, was never finished, or is none of qmpipe's");
   }
   const auto parts_hash = load_little_endian<std::uint64_t>(tail->data());
@@ -92,8 +87,8 @@ std::optional<Error> check_seal(const std::filesystem::path& path) {
   }
   const auto seal = read_file_range(path, body_bytes, count * kRangeBytes + 3 * kWord);
   if (!seal) return seal.error();
-  if (hash64(*seal, kSeed) != seal_hash) return refused("the file is damaged in its seal");
-  std::uint64_t hash = kSeed;
+  if (hash64(*seal, kSealSeed) != seal_hash) return refused("the file is damaged in its seal");
+  std::uint64_t hash = kSealSeed;
   std::uint64_t at = 0;
   for (std::uint64_t k = 0; k < count; ++k) {
     const std::uint8_t* entry = seal->data() + k * kRangeBytes;

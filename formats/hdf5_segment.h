@@ -25,6 +25,9 @@
 
 namespace qmpipe {
 
+// As it is registered with the HDF Group.
+inline constexpr std::uint16_t kZstdFilter = 32015;
+
 const char* segment_scheme_name(const TilingScheme& scheme);
 
 // What a file says it is, and the words for one that says something else: "its `called` is

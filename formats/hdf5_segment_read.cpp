@@ -12,7 +12,6 @@ namespace {
 
 constexpr std::size_t kMostIdentityBytes = 64;
 constexpr std::uint16_t kShuffleFilter = 2;
-constexpr std::uint16_t kZstdFilter = 32015;
 
 // As HDF5 writes its little-endian standard types: class and version, bits (order, padding, sign),
 // size; then offset and bits of the number, and what a floating-point one is made of.

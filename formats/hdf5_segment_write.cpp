@@ -13,7 +13,6 @@
 namespace qmpipe {
 namespace {
 
-constexpr H5Z_filter_t kZstdFilter = 32015;
 constexpr std::size_t kImageStepBytes = std::size_t{1} << 20U;
 constexpr std::size_t kMostDimensions = 4;
 

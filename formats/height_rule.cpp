@@ -12,7 +12,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr double kVoid = std::numeric_limits<double>::quiet_NaN();
+constexpr double kVoidHeight = std::numeric_limits<double>::quiet_NaN();
 
 // The file's own values went through a float.
 double as_stored(double value, GDALDataType type) {
@@ -37,13 +37,13 @@ double void_value_of(GDALRasterBand& band, std::vector<std::string>& assumptions
   } else {
     value = band.GetNoDataValue(&is_set);
   }
-  if (is_set == 0) return kVoid;
+  if (is_set == 0) return kVoidHeight;
   if (!fits(value, type)) {
     assumptions.push_back(
         fmt::format("the declared void value {} cannot stand in a band of {}; it marks nothing",
                     value, GDALGetDataTypeName(type)));
   }
-  return std::abs(value) <= kLargestHeight ? as_stored(value, type) : kVoid;
+  return std::abs(value) <= kLargestHeight ? as_stored(value, type) : kVoidHeight;
 }
 
 void take_voids(const VoidValues& voids, GDALDataType type, HeightRule& rule) {
@@ -109,13 +109,13 @@ void take_direction(const std::string& reason, RuledHeights& heights) {
 
 void HeightRule::mark_voids(std::span<double> raws) const {
   for (const double more : more_void_values) {
-    for (double& raw : raws) raw = raw == more ? kVoid : raw;
+    for (double& raw : raws) raw = raw == more ? kVoidHeight : raw;
   }
   // Without branches, so that a row's worth is done several at a time. False for NaN.
   for (double& raw : raws) {
     const bool is_height = (raw >= lowest_raw) & (raw <= highest_raw) &
                            (std::abs(raw) <= kLargestHeight) & (raw != void_value);
-    raw = is_height ? raw : kVoid;
+    raw = is_height ? raw : kVoidHeight;
   }
 }
 
@@ -123,7 +123,7 @@ void HeightRule::apply(std::span<double> values) const {
   mark_voids(values);
   for (double& value : values) {
     const double height = height_m(value);
-    value = std::abs(height) <= kLargestHeight ? height : kVoid;
+    value = std::abs(height) <= kLargestHeight ? height : kVoidHeight;
   }
 }
 

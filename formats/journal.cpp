@@ -16,9 +16,9 @@ namespace qmpipe {
 namespace {
 
 constexpr std::size_t kDigits = 16;
-constexpr std::uint64_t kSeed = 0x716D706970650002ULL;
+constexpr std::uint64_t kJournalSeed = 0x716D706970650002ULL;
 // Days of checkpoints every second stay below it.
-constexpr std::size_t kMostBytes = std::size_t{1} << 30U;
+constexpr std::size_t kMostJournalBytes = std::size_t{1} << 30U;
 
 std::uint64_t hash_of(const std::string& text, std::uint64_t seed) {
   return hash64({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, seed);
@@ -59,11 +59,11 @@ int write_whole(int descriptor, std::string_view bytes, std::size_t offset) {
 }  // namespace
 
 Result<JournalContent> parse_journal(std::span<const std::uint8_t> bytes) {
-  JournalContent content{.lines = {}, .sound_bytes = 0, .last_hash = kSeed};
+  JournalContent content{.lines = {}, .sound_bytes = 0, .last_hash = kJournalSeed};
   // A line's hash stands on the one before it, which is known from its digits even when its text is
   // damaged.
   std::optional<std::size_t> damaged_line;
-  std::optional<std::uint64_t> seed = kSeed;
+  std::optional<std::uint64_t> seed = kJournalSeed;
   std::size_t number = 0;
   for (std::size_t at = 0; at < bytes.size();) {
     ++number;
@@ -96,7 +96,7 @@ Result<std::unique_ptr<Journal>> Journal::open(const std::filesystem::path& path
   if (descriptor < 0) throw_io_error("cannot open the journal", path, errno);
   std::unique_ptr<Journal> journal(new Journal(path, descriptor));
   journal->lock_file_ = lock_open_file(descriptor, path);
-  const Result<std::vector<std::uint8_t>> bytes = read_file_bytes(path, kMostBytes);
+  const Result<std::vector<std::uint8_t>> bytes = read_file_bytes(path, kMostJournalBytes);
   if (!bytes) return bytes.error();
   Result<JournalContent> content = parse_journal(*bytes);
   if (!content) return Error{fmt::format("{}: {}", path.string(), content.error().message)};
@@ -113,7 +113,7 @@ void Journal::clear() {
   if (::ftruncate(descriptor_, 0) != 0 || ::fdatasync(descriptor_) != 0) {
     throw_io_error("cannot write the journal", path_, errno);
   }
-  content_ = {.lines = {}, .sound_bytes = 0, .last_hash = kSeed};
+  content_ = {.lines = {}, .sound_bytes = 0, .last_hash = kJournalSeed};
 }
 
 void Journal::append(const std::string& text) {

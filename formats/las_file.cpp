@@ -20,8 +20,8 @@ constexpr std::size_t kHeaderBytes14 = 375;
 constexpr std::size_t kRecordHeaderBytes = 54;
 constexpr std::size_t kLongRecordHeaderBytes = 60;
 // No CRS is longer; a length from outside must not decide how much memory is taken.
-constexpr std::uint64_t kMostCrsBytes = 1 << 20;
-constexpr std::uint64_t kBytesAtOnce = 1 << 20;
+constexpr std::uint64_t kMostLasCrsBytes = 1 << 20;
+constexpr std::uint64_t kRecordBytesAtOnce = 1 << 20;
 constexpr std::array<std::uint32_t, 11> kLeastRecordBytes = {20, 28, 26, 34, 57, 63,
                                                              30, 36, 38, 59, 67};
 
@@ -97,7 +97,7 @@ std::optional<Error> read_crs_records(const ByteSource& source, const Records& r
       return Error{fmt::format("variable length record {} of {} says {} bytes, but {} are left", k,
                                records.count, length, records.end - at)};
     }
-    if (is_crs_record(*record) && length <= kMostCrsBytes) {
+    if (is_crs_record(*record) && length <= kMostLasCrsBytes) {
       const auto payload = source.read(at, static_cast<std::size_t>(length));
       if (!payload) return payload.error();
       take_crs(load<std::uint16_t>(*record, 18), *payload, crs);
@@ -254,7 +254,7 @@ Result<LasHeader> read_las_header(const ByteSource& source) {
 
 std::optional<Error> for_each_las_point(const ByteSource& source, const LasHeader& header,
                                         const std::function<void(const LasPoint&)>& visit) {
-  const std::uint64_t most = std::max<std::uint64_t>(1, kBytesAtOnce / header.record_bytes);
+  const std::uint64_t most = std::max<std::uint64_t>(1, kRecordBytesAtOnce / header.record_bytes);
   for (std::uint64_t first = 0; first < header.point_count;) {
     const std::uint64_t count = std::min(most, header.point_count - first);
     const auto bytes = source.read(header.points_offset + first * header.record_bytes,

@@ -8,14 +8,12 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::uint64_t kSide = kBlockPosts;
-
 // The bytes of each block; none for one that is void.
 Result<std::vector<ByteRange>> locate_blocks(const Hdf5SegmentReader& file, std::size_t rows) {
   const auto data = file.chunked("blocks", rows, BlockCodec::largest_chunk_bytes());
   if (!data) return data.error();
-  const std::vector<std::uint64_t> shape = {rows, kSide, kSide};
-  const std::vector<std::uint64_t> chunk_shape = {1, kSide, kSide};
+  const std::vector<std::uint64_t> shape = {rows, kBlockPosts, kBlockPosts};
+  const std::vector<std::uint64_t> chunk_shape = {1, kBlockPosts, kBlockPosts};
   if (data->shape != shape || data->chunk_shape != chunk_shape ||
       data->element_bytes != sizeof(float)) {
     return file.refused_shape("blocks");

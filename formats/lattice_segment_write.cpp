@@ -9,11 +9,7 @@
 #include "scheduler/check.h"
 
 namespace qmpipe {
-namespace {
-
-constexpr std::uint64_t kSide = kBlockPosts;
-
-}  // namespace
+namespace {}  // namespace
 
 std::uint64_t content_hash(const TileKey& key, std::span<const std::uint8_t> chunk) {
   return hash64(chunk, packed(key));
@@ -30,8 +26,8 @@ EncodedSegment encode_lattice_segment(
   Hdf5SegmentWriter writer(path, store_identity(kSegmentFormatVersion, scheme));
   // So that a block without a chunk reads as void.
   const float fill_m = std::numeric_limits<float>::quiet_NaN();
-  writer.create_chunked("blocks", H5T_IEEE_F32LE, {blocks.size(), kSide, kSide}, {1, kSide, kSide},
-                        H5T_NATIVE_FLOAT, &fill_m);
+  writer.create_chunked("blocks", H5T_IEEE_F32LE, {blocks.size(), kBlockPosts, kBlockPosts},
+                        {1, kBlockPosts, kBlockPosts}, H5T_NATIVE_FLOAT, &fill_m);
   for (const auto& block : blocks) {
     if (!block->chunk.empty()) writer.write_chunk(segment.entries.size(), block->chunk);
     keys.insert(keys.end(), {block->key.zoom, block->key.x, block->key.y});

@@ -10,7 +10,7 @@ namespace qmpipe {
 namespace {
 
 // A rectangle of posts inside one block.
-struct Run {
+struct BlockRun {
   std::int64_t i = 0;
   std::int64_t j_first = 0;
   std::int64_t j_stop = 0;
@@ -21,7 +21,7 @@ std::int32_t posts_left_in_block(std::int64_t i) {
   return kBlockPosts - static_cast<std::int32_t>(i % kBlockPosts);
 }
 
-void copy_run(const std::vector<float>& block, const Run& run, const PostWindow& window,
+void copy_run(const std::vector<float>& block, const BlockRun& run, const PostWindow& window,
               std::int32_t column, std::span<float> out) {
   for (std::int64_t j = run.j_first; j < run.j_stop; ++j) {
     const auto from = block.begin() + j % kBlockPosts * kBlockPosts + run.i % kBlockPosts;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstring>
 #include <type_traits>
+#include <vector>
 
 namespace qmpipe {
 
@@ -16,6 +17,13 @@ requires std::is_arithmetic_v<T>
 void store_little_endian(std::uint8_t* to, T value) {
   std::memcpy(to, &value, sizeof(T));
   if constexpr (std::endian::native == std::endian::big) std::reverse(to, to + sizeof(T));
+}
+
+template <class T>
+requires std::is_arithmetic_v<T>
+void append_little_endian(std::vector<std::uint8_t>& bytes, T value) {
+  bytes.resize(bytes.size() + sizeof(T));
+  store_little_endian(bytes.data() + bytes.size() - sizeof(T), value);
 }
 
 // REQUIRES: sizeof(T) readable bytes at `from`.

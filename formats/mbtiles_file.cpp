@@ -7,14 +7,12 @@
 
 #include "formats/errors.h"
 #include "formats/hash64.h"
+#include "formats/mbtiles_schema.h"
 #include "formats/tile_set.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
 namespace {
-
-// A tile and a row's other columns.
-constexpr std::size_t kLimitBytes = kLargestTileBytes + 4096;
 
 // Whatever SQLite's defaults are where it was built. Freed pages are overwritten, because what they
 // held would depend on what was in memory when. The lock is kept from the first transaction on. Pages
@@ -46,12 +44,8 @@ void bind_key(SqliteStatement& statement, const TileKey& key) {
   statement.bind(3, std::int64_t{key.y});
 }
 
-std::string text_of(std::span<const std::uint8_t> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 SqliteFile open_file(const std::filesystem::path& path) {
-  Result<SqliteFile> file = SqliteFile::open(path, SqliteAccess::kWrite, kLimitBytes);
+  Result<SqliteFile> file = SqliteFile::open(path, SqliteAccess::kWrite, kMostMbtilesValueBytes);
   if (!file) {
     throw IoError("cannot write", path.string(), file.error().message,
                   "Check that its folder is there and can be written to.");
@@ -94,8 +88,7 @@ void MbtilesFile::require_own_schema() {
   // Word for word: views and computed columns run what a file says.
   SqliteStatement objects = prepare("SELECT sql FROM sqlite_schema ORDER BY rowid");
   std::size_t own = 0;
-  while (has_id && own < kSchema.size() && step(objects) &&
-         text_of(objects.bytes(0)) == kSchema[own]) {
+  while (has_id && own < kSchema.size() && step(objects) && objects.text(0) == kSchema[own]) {
     ++own;
   }
   if (own == kSchema.size() && !step(objects)) return;
@@ -187,7 +180,7 @@ std::optional<ZoomSpan> MbtilesFile::zooms() {
 bool MbtilesFile::has_metadata(const std::vector<std::pair<std::string, std::string>>& rows) {
   SqliteStatement read = prepare("SELECT name, value FROM metadata ORDER BY rowid");
   for (const auto& [name, value] : rows) {
-    if (!step(read) || text_of(read.bytes(0)) != name || text_of(read.bytes(1)) != value) {
+    if (!step(read) || read.text(0) != name || read.text(1) != value) {
       return false;
     }
   }

@@ -184,10 +184,6 @@ class ViewParser {
   std::vector<std::string> tables_;
 };
 
-std::string text_of(std::span<const std::uint8_t> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 struct SchemaObject {
   std::string type;
   std::string sql;
@@ -203,9 +199,8 @@ Result<std::optional<SchemaObject>> find_object(SqliteFile& file, const std::str
   const auto has_row = row->step();
   if (!has_row) return has_row.error();
   if (!*has_row) return std::optional<SchemaObject>();
-  return std::optional(SchemaObject{.type = text_of(row->bytes(0)),
-                                    .sql = text_of(row->bytes(1)),
-                                    .is_stored = row->integer(2) > 0});
+  return std::optional(
+      SchemaObject{.type = row->text(0), .sql = row->text(1), .is_stored = row->integer(2) > 0});
 }
 
 // Columns that are computed run what the file says.

@@ -8,8 +8,12 @@
 
 #include "formats/result.h"
 #include "formats/sqlite_file.h"
+#include "formats/tile_set.h"
 
 namespace qmpipe {
+
+// The largest value that is read or written: a tile, with room for the row's other columns.
+inline constexpr std::size_t kMostMbtilesValueBytes = kLargestTileBytes + 4096;
 
 // The tables that a view reads. Refuses every view that does not pick columns of one table, or of two
 // that are joined where columns are equal: what MBTiles 1.3 shows and programs write. `sql` is its

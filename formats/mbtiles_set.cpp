@@ -23,8 +23,6 @@ namespace fs = std::filesystem;
 // More readers at a time wait; each has a page cache of its own.
 constexpr std::size_t kConnections = 4;
 constexpr std::size_t kHeaderBytes = 100;
-// Room for a row's other columns.
-constexpr std::size_t kLimitBytes = kLargestTileBytes + 4096;
 
 const char* const kKeysSql = "SELECT zoom_level, tile_column, tile_row FROM tiles";
 const char* const kReadSql =
@@ -53,7 +51,7 @@ std::int64_t most_instructions(std::uint64_t file_bytes) {
 }
 
 Result<Connection> connect(const fs::path& path, const Opening& opening) {
-  Result<SqliteFile> file = SqliteFile::open(path, opening.access, kLimitBytes);
+  Result<SqliteFile> file = SqliteFile::open(path, opening.access, kMostMbtilesValueBytes);
   if (!file) return file.error();
   file->limit_work(most_instructions(opening.file_bytes));
   if (const auto error = fault_of_schema(*file)) return *error;
@@ -103,10 +101,6 @@ class ConnectionPool {
   std::vector<Connection*> free_;
 };
 
-std::string text_of(std::span<const std::uint8_t> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 // A value of a row that is no tile, as a part of its path.
 std::string text_of_column(const SqliteStatement& row, int column) {
   constexpr std::size_t kMostShown = 20;
@@ -116,7 +110,7 @@ std::string text_of_column(const SqliteStatement& row, int column) {
     case SqliteType::kNull:
       return "NULL";
     default:
-      return text_of(row.bytes(column)).substr(0, kMostShown);
+      return row.text(column).substr(0, kMostShown);
   }
 }
 
@@ -187,7 +181,7 @@ Result<std::string> read_layer_text(SqliteFile& file) {
   if (!is_text) {
     return Error{"its metadata hold no layer.json (no row named `layer.json` or `layer_json`)"};
   }
-  return text_of(row->bytes(0));
+  return row->text(0);
 }
 
 class MbtilesSet final : public TileSet {
@@ -216,7 +210,7 @@ class MbtilesSet final : public TileSet {
   Result<std::int64_t> stored_bytes(const TileKey& key) const override {
     return pool_.with_one([&](Connection& connection) -> Result<std::int64_t> {
       if (const auto error = find(connection.size, key)) return *error;
-      if (text_of(connection.size.bytes(0)) != "blob") return no_blob(key);
+      if (connection.size.text(0) != "blob") return no_blob(key);
       return connection.size.integer(1);
     });
   }

@@ -16,7 +16,7 @@ struct Cell {
   std::int32_t place;  // the position in it
 };
 
-struct Run {
+struct RangeRun {
   std::int32_t first_line;
   std::int32_t last_line;
   std::int32_t first_place;
@@ -24,8 +24,8 @@ struct Run {
 };
 
 // REQUIRES: cells sorted by line, then place.
-std::vector<Run> runs_of(std::span<const Cell> cells) {
-  std::vector<Run> runs;
+std::vector<RangeRun> runs_of(std::span<const Cell> cells) {
+  std::vector<RangeRun> runs;
   // Runs that end in the line before or in this one, by their places.
   std::map<std::pair<std::int32_t, std::int32_t>, std::size_t> open_runs;
   std::size_t begin = 0;
@@ -35,10 +35,10 @@ std::vector<Run> runs_of(std::span<const Cell> cells) {
            cells[end].place == cells[end - 1].place + 1) {
       ++end;
     }
-    const Run run = {.first_line = cells[begin].line,
-                     .last_line = cells[begin].line,
-                     .first_place = cells[begin].place,
-                     .last_place = cells[end - 1].place};
+    const RangeRun run = {.first_line = cells[begin].line,
+                          .last_line = cells[begin].line,
+                          .first_place = cells[begin].place,
+                          .last_place = cells[end - 1].place};
     const auto [it, is_new] = open_runs.try_emplace({run.first_place, run.last_place}, runs.size());
     if (!is_new && runs[it->second].last_line == run.first_line - 1) {
       runs[it->second].last_line = run.last_line;
@@ -64,7 +64,7 @@ std::vector<TileRange> ranges_along(std::span<const TileKey> keys, Along along) 
     });
   }
   std::vector<TileRange> ranges;
-  for (const Run& run : runs_of(cells)) {
+  for (const RangeRun& run : runs_of(cells)) {
     ranges.push_back(along == Along::kRows ? TileRange{.start_x = run.first_place,
                                                        .start_y = run.first_line,
                                                        .end_x = run.last_place,

@@ -19,12 +19,6 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-template <class T>
-void append(Bytes& bytes, T value) {
-  bytes.resize(bytes.size() + sizeof(T));
-  store_little_endian(bytes.data() + bytes.size() - sizeof(T), value);
-}
-
 Bytes ply_bytes(const ExportMesh& mesh) {
   std::string header = fmt::format(
       "ply\nformat binary_little_endian 1.0\ncomment written by qmpipe, metres, z up\n"
@@ -37,13 +31,13 @@ Bytes ply_bytes(const ExportMesh& mesh) {
                         mesh.indices.size() / 3);
   Bytes bytes(header.begin(), header.end());
   for (std::size_t i = 0; i < mesh.positions_m.size(); ++i) {
-    for (const double value : mesh.positions_m[i]) append(bytes, value);
+    for (const double value : mesh.positions_m[i]) append_little_endian(bytes, value);
     if (mesh.normals.empty()) continue;
-    for (const float value : mesh.normals[i]) append(bytes, value);
+    for (const float value : mesh.normals[i]) append_little_endian(bytes, value);
   }
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
-    append(bytes, std::uint8_t{3});
-    for (std::size_t k = 0; k < 3; ++k) append(bytes, mesh.indices[i + k]);
+    append_little_endian(bytes, std::uint8_t{3});
+    for (std::size_t k = 0; k < 3; ++k) append_little_endian(bytes, mesh.indices[i + k]);
   }
   return bytes;
 }
@@ -109,7 +103,7 @@ std::size_t add_positions(GlbParts& parts, const ExportMesh& mesh) {
   for (const Vec3& position : mesh.positions_m) {
     const Float3 p = y_up(position);
     for (std::size_t k = 0; k < 3; ++k) {
-      append(parts.binary, p[k]);
+      append_little_endian(parts.binary, p[k]);
       low[k] = std::min(low[k], p[k]);
       high[k] = std::max(high[k], p[k]);
     }
@@ -125,7 +119,7 @@ std::size_t add_positions(GlbParts& parts, const ExportMesh& mesh) {
 std::size_t add_normals(GlbParts& parts, const ExportMesh& mesh) {
   const std::size_t begin = parts.binary.size();
   for (const Float3& normal : mesh.normals) {
-    for (const float value : y_up(normal)) append(parts.binary, value);
+    for (const float value : y_up(normal)) append_little_endian(parts.binary, value);
   }
   return parts.add_accessor(
       begin, kVertexData,
@@ -134,7 +128,7 @@ std::size_t add_normals(GlbParts& parts, const ExportMesh& mesh) {
 
 std::size_t add_indices(GlbParts& parts, const ExportMesh& mesh) {
   const std::size_t begin = parts.binary.size();
-  for (const std::uint32_t index : mesh.indices) append(parts.binary, index);
+  for (const std::uint32_t index : mesh.indices) append_little_endian(parts.binary, index);
   return parts.add_accessor(
       begin, kIndexData,
       {{"componentType", kUint32}, {"count", mesh.indices.size()}, {"type", "SCALAR"}});
@@ -169,14 +163,15 @@ Bytes glb_bytes(const ExportMesh& mesh) {
   constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
   constexpr std::uint32_t kBinaryChunk = 0x004E4942;
   Bytes bytes;
-  append(bytes, kGltf);
-  append(bytes, std::uint32_t{2});
-  append(bytes, static_cast<std::uint32_t>(12 + 8 + json.size() + 8 + parts.binary.size()));
-  append(bytes, static_cast<std::uint32_t>(json.size()));
-  append(bytes, kJsonChunk);
+  append_little_endian(bytes, kGltf);
+  append_little_endian(bytes, std::uint32_t{2});
+  append_little_endian(bytes,
+                       static_cast<std::uint32_t>(12 + 8 + json.size() + 8 + parts.binary.size()));
+  append_little_endian(bytes, static_cast<std::uint32_t>(json.size()));
+  append_little_endian(bytes, kJsonChunk);
   bytes.insert(bytes.end(), json.begin(), json.end());
-  append(bytes, static_cast<std::uint32_t>(parts.binary.size()));
-  append(bytes, kBinaryChunk);
+  append_little_endian(bytes, static_cast<std::uint32_t>(parts.binary.size()));
+  append_little_endian(bytes, kBinaryChunk);
   // Only whole floats and indices: a multiple of 4 bytes already.
   bytes.insert(bytes.end(), parts.binary.begin(), parts.binary.end());
   return bytes;
@@ -203,18 +198,18 @@ Bytes stl_bytes(const ExportMesh& mesh) {
   header.resize(80, ' ');
   Bytes bytes(header.begin(), header.end());
   bytes.reserve(84 + 50 * (mesh.indices.size() / 3));
-  append(bytes, static_cast<std::uint32_t>(mesh.indices.size() / 3));
+  append_little_endian(bytes, static_cast<std::uint32_t>(mesh.indices.size() / 3));
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
     std::array<Float3, 3> corners{};
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3& p = mesh.positions_m[mesh.indices[i + k]];
       corners[k] = {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
     }
-    for (const float value : normal_of(corners)) append(bytes, value);
+    for (const float value : normal_of(corners)) append_little_endian(bytes, value);
     for (const Float3& corner : corners) {
-      for (const float value : corner) append(bytes, value);
+      for (const float value : corner) append_little_endian(bytes, value);
     }
-    append(bytes, std::uint16_t{0});
+    append_little_endian(bytes, std::uint16_t{0});
   }
   return bytes;
 }

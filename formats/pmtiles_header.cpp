@@ -11,7 +11,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::array<std::uint8_t, 8> kMagic = {'P', 'M', 'T', 'i', 'l', 'e', 's', 3};
+constexpr std::array<std::uint8_t, 8> kPmtilesMagic = {'P', 'M', 'T', 'i', 'l', 'e', 's', 3};
 constexpr double kStepsPerDegree = 1e7;
 
 // Where the fields lie.
@@ -23,7 +23,7 @@ constexpr std::size_t kCentre = 118;
 
 class HeaderWriter {
  public:
-  HeaderWriter() { std::copy(kMagic.begin(), kMagic.end(), bytes_.begin()); }
+  HeaderWriter() { std::copy(kPmtilesMagic.begin(), kPmtilesMagic.end(), bytes_.begin()); }
   void put_section(std::size_t index, const PmtilesSection& section) {
     put(kSections + 16 * index, section.offset);
     put(kSections + 16 * index + 8, section.bytes);
@@ -111,10 +111,11 @@ std::vector<std::uint8_t> write_pmtiles_header(const PmtilesHeader& header) {
 
 Result<PmtilesHeader> read_pmtiles_header(std::span<const std::uint8_t> bytes,
                                           std::uint64_t file_bytes) {
-  if (bytes.size() < kMagic.size() || std::memcmp(bytes.data(), kMagic.data(), 7) != 0) {
+  if (bytes.size() < kPmtilesMagic.size() ||
+      std::memcmp(bytes.data(), kPmtilesMagic.data(), 7) != 0) {
     return Error{"it does not begin as a PMTiles archive does"};
   }
-  if (bytes[7] != kMagic[7]) {
+  if (bytes[7] != kPmtilesMagic[7]) {
     return Error{fmt::format("it is of PMTiles version {}; only version 3 is read", bytes[7])};
   }
   if (bytes.size() < kPmtilesHeaderBytes) return Error{"it ends within the header"};

@@ -15,7 +15,7 @@
 namespace qmpipe {
 namespace {
 
-using Json = nlohmann::json;
+using MetadataJson = nlohmann::json;
 using Bytes = std::vector<std::uint8_t>;
 
 // What the metadata tell of the tiles.
@@ -26,7 +26,7 @@ struct Metadata {
 
 Result<Metadata> parse_metadata(const Bytes& text) {
   // Without exceptions: the bytes are anybody's.
-  const Json json = Json::parse(text.begin(), text.end(), nullptr, false);
+  const MetadataJson json = MetadataJson::parse(text.begin(), text.end(), nullptr, false);
   if (!json.is_object()) return Error{"the metadata are no JSON object"};
   Metadata metadata;
   if (const auto layer = json.find(kLayerJsonKey); layer != json.end() && layer->is_string()) {

@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kWhatFailed[] = "cannot read the points of";
-constexpr std::size_t kBytesAtOnce = 1 << 20;
+constexpr std::size_t kTextBytesAtOnce = 1 << 20;
 // Of the point format, whose upper bits LAZ sets.
 constexpr std::size_t kLasFormatAt = 104;
 // Degrees need as many for steps of about a centimetre in whatever digits the text is written.
@@ -225,7 +225,7 @@ TextPoints parse_text_file(const fs::path& path) {
   PointTextParser parser;
   for (std::uint64_t at = 0; at < source.size_bytes;) {
     const auto count =
-        static_cast<std::size_t>(std::min<std::uint64_t>(kBytesAtOnce, source.size_bytes - at));
+        static_cast<std::size_t>(std::min<std::uint64_t>(kTextBytesAtOnce, source.size_bytes - at));
     const auto bytes = source.read(at, count);
     if (!bytes) check(path, bytes.error());
     if (const auto error = parser.feed(*bytes)) {

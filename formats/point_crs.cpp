@@ -21,50 +21,44 @@
 namespace qmpipe {
 namespace {
 
-constexpr char kRemedy[] = "say which one it is with --source-crs EPSG:n";
+constexpr char kCrsRemedy[] = "say which one it is with --source-crs EPSG:n";
 
 using Dataset = std::unique_ptr<GDALDataset, CloseDataset>;
-
-template <class T>
-void append(std::vector<std::uint8_t>& bytes, T value) {
-  bytes.resize(bytes.size() + sizeof(T));
-  store_little_endian(bytes.data() + bytes.size() - sizeof(T), value);
-}
 
 // A little-endian TIFF that grows tag by tag, values behind the directory.
 class TagList {
  public:
   explicit TagList(std::uint16_t count) : count_(count) {
-    append(head_, std::uint16_t{0x4949});
-    append(head_, std::uint16_t{42});
-    append(head_, std::uint32_t{8});
-    append(head_, count);
+    append_little_endian(head_, std::uint16_t{0x4949});
+    append_little_endian(head_, std::uint16_t{42});
+    append_little_endian(head_, std::uint32_t{8});
+    append_little_endian(head_, count);
   }
   void add_number(std::uint16_t tag, std::uint16_t value) {
     add_entry(tag, 3, 1);
-    append(head_, value);
-    append(head_, std::uint16_t{0});
+    append_little_endian(head_, value);
+    append_little_endian(head_, std::uint16_t{0});
   }
   // REQUIRES: more than four bytes.
   template <class T>
   void add_values(std::uint16_t tag, std::uint16_t type, const T& values) {
     add_entry(tag, type, static_cast<std::uint32_t>(values.size()));
     const std::size_t directory_bytes = 8 + 2 + std::size_t{12} * count_ + 4;
-    append(head_, static_cast<std::uint32_t>(directory_bytes + tail_.size()));
-    for (const auto value : values) append(tail_, value);
+    append_little_endian(head_, static_cast<std::uint32_t>(directory_bytes + tail_.size()));
+    for (const auto value : values) append_little_endian(tail_, value);
     if (tail_.size() % 2 != 0) tail_.push_back(0);
   }
   std::vector<std::uint8_t> finish() {
-    append(head_, std::uint32_t{0});
+    append_little_endian(head_, std::uint32_t{0});
     head_.insert(head_.end(), tail_.begin(), tail_.end());
     return std::move(head_);
   }
 
  private:
   void add_entry(std::uint16_t tag, std::uint16_t type, std::uint32_t values) {
-    append(head_, tag);
-    append(head_, type);
-    append(head_, values);
+    append_little_endian(head_, tag);
+    append_little_endian(head_, type);
+    append_little_endian(head_, values);
   }
   std::uint16_t count_;
   std::vector<std::uint8_t> head_;
@@ -117,7 +111,7 @@ std::string crs_in_keys(const std::string& path, const LasCrs& crs, const GdalSe
   VSIUnlink(name.c_str());
   if (wkt.empty()) {
     throw IoError("cannot use the GeoTIFF keys in", path,
-                  session.cause("they name no CRS that GDAL knows"), kRemedy);
+                  session.cause("they name no CRS that GDAL knows"), kCrsRemedy);
   }
   return wkt;
 }
@@ -160,7 +154,7 @@ RasterCrs crs_of_points(const std::string& path, const LasCrs& crs,
     OGRSpatialReference own;
     if (!wkt.empty() && own.importFromWkt(wkt.c_str()) != OGRERR_NONE) {
       throw IoError("cannot use the CRS in", path, session.cause("it is no well-known text"),
-                    kRemedy);
+                    kCrsRemedy);
     }
     own.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
     // What GDAL makes of keys that name no projection is a plane in metres, whatever their unit.

@@ -20,6 +20,9 @@ inline constexpr std::int32_t kQuantizedMax = 32767;
 // CesiumJS reads a tile of exactly this many vertices in neither index width.
 inline constexpr std::size_t kForbiddenVertexCount = 65536;
 
+// Of an encoded tile, whatever else is in it.
+bool has_forbidden_vertex_count(std::span<const std::uint8_t> bytes);
+
 using Vec3 = std::array<double, 3>;
 // Unit normal in ECEF, octahedral encoding, x then y.
 using OctNormal = std::array<std::uint8_t, 2>;

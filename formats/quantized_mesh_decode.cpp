@@ -11,13 +11,13 @@ namespace {
 
 using MaybeError = std::optional<Error>;
 
-class Decoder {
+class MeshDecoder {
  public:
-  explicit Decoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
+  explicit MeshDecoder(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
 
   Result<QuantizedMesh> run() {
-    for (const auto step : {&Decoder::read_header, &Decoder::read_vertices, &Decoder::read_indices,
-                            &Decoder::read_extensions}) {
+    for (const auto step : {&MeshDecoder::read_header, &MeshDecoder::read_vertices,
+                            &MeshDecoder::read_indices, &MeshDecoder::read_extensions}) {
       if (MaybeError error = (this->*step)()) return *std::move(error);
     }
     return std::move(mesh_);
@@ -224,6 +224,14 @@ class Decoder {
 
 }  // namespace
 
-Result<QuantizedMesh> decode(std::span<const std::uint8_t> bytes) { return Decoder(bytes).run(); }
+Result<QuantizedMesh> decode(std::span<const std::uint8_t> bytes) {
+  return MeshDecoder(bytes).run();
+}
+
+bool has_forbidden_vertex_count(std::span<const std::uint8_t> bytes) {
+  return bytes.size() >= detail::kHeaderBytes + sizeof(std::uint32_t) &&
+         load_little_endian<std::uint32_t>(bytes.data() + detail::kHeaderBytes) ==
+             kForbiddenVertexCount;
+}
 
 }  // namespace qmpipe

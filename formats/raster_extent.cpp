@@ -11,7 +11,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr int kStepsPerSide = 256;
+constexpr int kExtentStepsPerSide = 256;
 constexpr int kStepsInside = 32;
 // A gap in the longitudes narrower than this is the distance between two of our points.
 constexpr double kWidestStepDeg = 12;
@@ -23,8 +23,8 @@ std::vector<PixelPoint> points_of(const RasterSize& size) {
   const double width = static_cast<double>(size.width);
   const double height = static_cast<double>(size.height);
   std::vector<PixelPoint> points;
-  for (int k = 0; k <= kStepsPerSide; ++k) {
-    const double part = static_cast<double>(k) / kStepsPerSide;
+  for (int k = 0; k <= kExtentStepsPerSide; ++k) {
+    const double part = static_cast<double>(k) / kExtentStepsPerSide;
     points.push_back({.column = part * width, .row = 0});
     points.push_back({.column = part * width, .row = height});
     points.push_back({.column = 0, .row = part * height});

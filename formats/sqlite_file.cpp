@@ -146,6 +146,11 @@ std::span<const std::uint8_t> SqliteStatement::bytes(int column) const {
   return {static_cast<const std::uint8_t*>(data), static_cast<std::size_t>(size)};
 }
 
+std::string SqliteStatement::text(int column) const {
+  const std::span<const std::uint8_t> value = bytes(column);
+  return {reinterpret_cast<const char*>(value.data()), value.size()};
+}
+
 void SqliteFile::Close::operator()(sqlite3* connection) const {
   // Whatever transaction is open is rolled back.
   sqlite3_close(connection);

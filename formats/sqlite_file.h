@@ -53,6 +53,8 @@ class SqliteStatement {
   std::int64_t integer(int column) const;
   // A blob's or a text's bytes, until the next step() or reset().
   std::span<const std::uint8_t> bytes(int column) const;
+  // The same bytes as a text.
+  std::string text(int column) const;
 
  private:
   struct Finalize {

@@ -15,18 +15,12 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::array<std::uint8_t, 8> kMagic = {'Q', 'M', 'S', 'U', 'R', 'V', '0', '2'};
-constexpr std::size_t kHeadBytes = kMagic.size() + 6 * sizeof(std::int32_t);
+constexpr std::array<std::uint8_t, 8> kSurveyMagic = {'Q', 'M', 'S', 'U', 'R', 'V', '0', '2'};
+constexpr std::size_t kHeadBytes = kSurveyMagic.size() + 6 * sizeof(std::int32_t);
 constexpr std::size_t kTileBytes = 6 * sizeof(std::int32_t);
 // All tiles of the deepest zoom that any machine could survey.
-constexpr std::size_t kMostBytes = std::size_t{1} << 36U;
+constexpr std::size_t kMostSurveyBytes = std::size_t{1} << 36U;
 constexpr std::int32_t kMostPosts = kTilePosts * kTilePosts;
-
-template <class T>
-void append(std::vector<std::uint8_t>& bytes, T value) {
-  bytes.resize(bytes.size() + sizeof(T));
-  store_little_endian(bytes.data() + bytes.size() - sizeof(T), value);
-}
 
 // Empty when the tile may stand in a survey.
 std::string fault_of(const SurveyedTile& tile, const TilingScheme& scheme) {
@@ -51,21 +45,21 @@ std::filesystem::path survey_file_path(const std::filesystem::path& folder, std:
 
 void write_survey_file(const std::filesystem::path& path, std::int32_t zoom,
                        const SurveyedZoom& surveyed) {
-  std::vector<std::uint8_t> bytes(kMagic.begin(), kMagic.end());
+  std::vector<std::uint8_t> bytes(kSurveyMagic.begin(), kSurveyMagic.end());
   bytes.reserve(kHeadBytes + surveyed.tiles.size() * kTileBytes);
-  append(bytes, zoom);
-  append(bytes, static_cast<std::int32_t>(surveyed.tiles.size()));
+  append_little_endian(bytes, zoom);
+  append_little_endian(bytes, static_cast<std::int32_t>(surveyed.tiles.size()));
   for (const std::optional<float>& height_m : surveyed.pole_heights_m) {
-    append(bytes, std::int32_t{height_m.has_value()});
-    append(bytes, height_m.value_or(0));
+    append_little_endian(bytes, std::int32_t{height_m.has_value()});
+    append_little_endian(bytes, height_m.value_or(0));
   }
   for (const SurveyedTile& tile : surveyed.tiles) {
-    append(bytes, tile.key.x);
-    append(bytes, tile.key.y);
-    append(bytes, tile.lowest_m);
-    append(bytes, tile.highest_m);
-    append(bytes, tile.valid_posts);
-    append(bytes, tile.rim_m);
+    append_little_endian(bytes, tile.key.x);
+    append_little_endian(bytes, tile.key.y);
+    append_little_endian(bytes, tile.lowest_m);
+    append_little_endian(bytes, tile.highest_m);
+    append_little_endian(bytes, tile.valid_posts);
+    append_little_endian(bytes, tile.rim_m);
   }
   append_seal(bytes, {});
   write_file_durably(path, bytes);
@@ -81,10 +75,11 @@ void remove_survey_files(const std::filesystem::path& folder) {
 
 Result<SurveyedZoom> parse_surveyed_zoom(std::span<const std::uint8_t> bytes, std::int32_t zoom,
                                          const TilingScheme& scheme) {
-  if (bytes.size() < kHeadBytes || !std::equal(kMagic.begin(), kMagic.end(), bytes.begin())) {
+  if (bytes.size() < kHeadBytes ||
+      !std::equal(kSurveyMagic.begin(), kSurveyMagic.end(), bytes.begin())) {
     return Error{"it holds no survey of this version"};
   }
-  ByteCursor numbers(bytes.subspan(kMagic.size()));
+  ByteCursor numbers(bytes.subspan(kSurveyMagic.size()));
   if (numbers.next<std::int32_t>() != zoom) return Error{"it holds another zoom's survey"};
   const auto count = numbers.next<std::int32_t>();
   if (count < 0 || bytes.size() - kHeadBytes != static_cast<std::size_t>(count) * kTileBytes) {
@@ -115,7 +110,7 @@ Result<SurveyedZoom> parse_surveyed_zoom(std::span<const std::uint8_t> bytes, st
 Result<SurveyedZoom> read_survey_file(const std::filesystem::path& path, std::int32_t zoom,
                                       const TilingScheme& scheme) {
   if (const auto fault = check_seal(path)) return *fault;
-  const auto bytes = read_file_bytes(path, kMostBytes);
+  const auto bytes = read_file_bytes(path, kMostSurveyBytes);
   if (!bytes) return bytes.error();
   auto surveyed = parse_surveyed_zoom(without_seal(*bytes), zoom, scheme);
   if (!surveyed) return Error{fmt::format("{}: {}", path.string(), surveyed.error().message)};

@@ -22,7 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const char* const kRemedy = "Name the folder that holds layer.json, or the file of a packed set.";
+const char* const kPathRemedy =
+    "Name the folder that holds layer.json, or the file of a packed set.";
 
 bool is_all_digits(const std::string& text) {
   return !text.empty() && std::all_of(text.begin(), text.end(),
@@ -165,7 +166,7 @@ std::unique_ptr<TileSet> open_file_set(const fs::path& path) {
       break;
   }
   throw IoError("cannot open the tile set", path.string(),
-                "it is neither a folder nor an .mbtiles or .pmtiles file", kRemedy);
+                "it is neither a folder nor an .mbtiles or .pmtiles file", kPathRemedy);
 }
 
 std::unique_ptr<TileSet> open_folder_set(const fs::path& folder) {
@@ -173,7 +174,7 @@ std::unique_ptr<TileSet> open_folder_set(const fs::path& folder) {
   auto tile_set = std::make_unique<FolderTileSet>(folder);
   if (tile_set->keys().empty() && !fs::exists(folder / "layer.json", code)) {
     throw IoError("cannot open the tile set", folder.string(),
-                  "there is neither a layer.json nor a tile in it", kRemedy);
+                  "there is neither a layer.json nor a tile in it", kPathRemedy);
   }
   return tile_set;
 }

@@ -7,7 +7,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::int64_t kStepsPerSide = 16;
+constexpr std::int64_t kPixelStepsPerSide = 16;
 // Out to the globe and back: more than a pixel off is another place.
 constexpr double kSamePixel = 1;
 // A pixel's middle that is meant to be on the pole may be a last digit beyond it.
@@ -28,8 +28,8 @@ bool is_placed(const RasterGrid& grid, const PixelPoint& pixel) {
 // Of so many steps from the first of `length` pixels to the last; each pixel once.
 std::vector<std::int64_t> spread_over(std::int64_t length) {
   std::vector<std::int64_t> indices;
-  for (std::int64_t k = 0; k <= kStepsPerSide; ++k) {
-    const std::int64_t index = (length - 1) * k / kStepsPerSide;
+  for (std::int64_t k = 0; k <= kPixelStepsPerSide; ++k) {
+    const std::int64_t index = (length - 1) * k / kPixelStepsPerSide;
     if (indices.empty() || indices.back() != index) indices.push_back(index);
   }
   return indices;

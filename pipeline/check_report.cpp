@@ -5,13 +5,10 @@
 
 #include "formats/printable.h"
 #include "pipeline/check_url.h"
+#include "pipeline/text_table.h"
 
 namespace qmpipe {
 namespace {
-
-std::string counted(std::int64_t number, const char* noun) {
-  return fmt::format("{} {}{}", number, noun, number == 1 ? "" : "s");
-}
 
 // What viewers do, and the remedy, once for all findings of a kind.
 enum class Advice { kShown, kShownAfter };
@@ -46,7 +43,7 @@ std::string text_of(const CheckReport& report) {
         text_of_finding(report.findings[k], is_last_of_kind ? Advice::kShown : Advice::kShownAfter);
   }
   text += fmt::format("check: {}: {} of {} without a fault", printable_line(report.layer_url),
-                      report.tiles_sound, counted(report.tiles_asked, "tile"));
+                      grouped(report.tiles_sound), counted(report.tiles_asked, "tile"));
   if (report.deepest_zoom > 0) text += fmt::format(", down to zoom {}", report.deepest_zoom);
   for (const CheckSeverity severity :
        {CheckSeverity::kFault, CheckSeverity::kWarning, CheckSeverity::kHint}) {

@@ -14,15 +14,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::size_t kVertexCountAt = 88;
 constexpr const char* kMediaType = "application/vnd.quantized-mesh";
-
-bool has_forbidden_count(std::span<const std::uint8_t> bytes) {
-  if (bytes.size() < kVertexCountAt + 4) return false;
-  std::size_t count = 0;
-  for (std::size_t k = 4; k-- > 0;) count = count << 8U | bytes[kVertexCountAt + k];
-  return count == kForbiddenVertexCount;
-}
 
 void check_media_type(const HttpAnswer& answer, CheckLog& log) {
   const std::optional<std::string> header = answer.header("content-type");
@@ -120,7 +112,7 @@ std::optional<QuantizedMesh> check_tile_body(const ServedLayer& layer, const Til
   check_media_type(answer, log);
   Result<QuantizedMesh> mesh = decode(*plain);
   if (!mesh) {
-    add(has_forbidden_count(*plain) ? CheckKind::kVertexCount : CheckKind::kTileUnreadable,
+    add(has_forbidden_vertex_count(*plain) ? CheckKind::kVertexCount : CheckKind::kTileUnreadable,
         mesh.error().message);
     return std::nullopt;
   }

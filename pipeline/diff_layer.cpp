@@ -12,27 +12,27 @@ namespace qmpipe {
 namespace {
 
 // Keys sorted, so that their order does not count.
-using Json = nlohmann::json;
+using ParsedJson = nlohmann::json;
 
 constexpr std::size_t kLongestValue = 72;
 constexpr const char* kAbsent = "absent";
 
-std::string text_of(const Json* value) {
+std::string text_of(const ParsedJson* value) {
   if (value == nullptr) return kAbsent;
-  std::string text = value->dump(-1, ' ', true, Json::error_handler_t::replace);
+  std::string text = value->dump(-1, ' ', true, ParsedJson::error_handler_t::replace);
   // ASCII only, so that no character is cut in two.
   if (text.size() > kLongestValue) text = text.substr(0, kLongestValue) + "...";
   return text;
 }
 
-const Json* find(const Json& object, const std::string& key) {
+const ParsedJson* find(const ParsedJson& object, const std::string& key) {
   const auto found = object.find(key);
   return found == object.end() ? nullptr : &*found;
 }
 
 class Comparer {
  public:
-  void compare(const std::string& path, const Json* a, const Json* b) {
+  void compare(const std::string& path, const ParsedJson* a, const ParsedJson* b) {
     if (a != nullptr && b != nullptr && *a == *b) return;
     if (a != nullptr && b != nullptr && a->is_object() && b->is_object()) {
       compare_objects(path, *a, *b);
@@ -46,9 +46,9 @@ class Comparer {
   std::vector<LayerDifference> take() { return std::move(differences_); }
 
  private:
-  void compare_objects(const std::string& path, const Json& a, const Json& b) {
+  void compare_objects(const std::string& path, const ParsedJson& a, const ParsedJson& b) {
     std::set<std::string> keys;
-    for (const Json* object : {&a, &b}) {
+    for (const ParsedJson* object : {&a, &b}) {
       for (const auto& item : object->items()) keys.insert(item.key());
     }
     for (const std::string& key : keys) {
@@ -56,7 +56,7 @@ class Comparer {
     }
   }
 
-  void compare_lists(const std::string& path, const Json& a, const Json& b) {
+  void compare_lists(const std::string& path, const ParsedJson& a, const ParsedJson& b) {
     for (std::size_t k = 0; k < std::max(a.size(), b.size()); ++k) {
       compare(fmt::format("{}[{}]", path, k), k < a.size() ? &a[k] : nullptr,
               k < b.size() ? &b[k] : nullptr);
@@ -85,8 +85,8 @@ std::vector<LayerDifference> differences_of_layers(const Result<std::string>& a,
     return {{.key = "layer.json", .a = words(fault_a), .b = words(fault_b)}};
   }
   Comparer comparer;
-  const Json json_a = Json::parse(*a);
-  const Json json_b = Json::parse(*b);
+  const ParsedJson json_a = ParsedJson::parse(*a);
+  const ParsedJson json_b = ParsedJson::parse(*b);
   comparer.compare("", &json_a, &json_b);
   return comparer.take();
 }

@@ -16,8 +16,6 @@
 namespace qmpipe {
 namespace {
 
-// Where the vertex count stands in the file.
-constexpr std::size_t kVertexCountAt = 88;
 // An occlusion point this far out, in radii, stands for one at infinity.
 constexpr double kAsGoodAsInfinite = 1e5;
 // A tile's heights that are many metres apart, and those that are so few that it does not matter.
@@ -28,13 +26,6 @@ constexpr double kHorizonSlack = 0.02;
 
 bool is_finite(const Vec3& a) {
   return std::isfinite(a[0]) && std::isfinite(a[1]) && std::isfinite(a[2]);
-}
-
-bool has_forbidden_count(const std::vector<std::uint8_t>& bytes) {
-  if (bytes.size() < kVertexCountAt + 4) return false;
-  std::size_t count = 0;
-  for (std::size_t k = 4; k-- > 0;) count = count << 8U | bytes[kVertexCountAt + k];
-  return count == kForbiddenVertexCount;
 }
 
 class MeshCheck {
@@ -330,9 +321,9 @@ CheckedTile check_tile(const TilingScheme& scheme, const TileKey& key,
   if (!plain) return refuse(FindingKind::kUnreadableTile, plain.error().message);
   Result<QuantizedMesh> mesh = decode(*plain);
   if (!mesh) {
-    return refuse(
-        has_forbidden_count(*plain) ? FindingKind::kVertexCount : FindingKind::kUnreadableTile,
-        mesh.error().message);
+    return refuse(has_forbidden_vertex_count(*plain) ? FindingKind::kVertexCount
+                                                     : FindingKind::kUnreadableTile,
+                  mesh.error().message);
   }
   checked.mesh = std::move(*mesh);
   checked.findings = check_mesh(scheme, key, *checked.mesh, rule);

@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stages/array_index.h"
+
 namespace qmpipe {
-namespace {
-constexpr std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
-}  // namespace
 
 CollapseTolerance::CollapseTolerance(const PostGrid& grid, std::span<const float> heights_m,
                                      double tolerance_m, const HeightSteps& height_steps,

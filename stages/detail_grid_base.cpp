@@ -9,14 +9,14 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::uint32_t kUnset = 0xFFFFFFFF;
+constexpr std::uint32_t kUnnumbered = 0xFFFFFFFF;
 
 using PostTriangle = std::array<Post, 3>;
 
 class GridBase {
  public:
   GridBase(const PostHeights& posts, const BlockGrid& grid)
-      : posts_(posts), grid_(grid), number_(posts.z.size(), kUnset) {
+      : posts_(posts), grid_(grid), number_(posts.z.size(), kUnnumbered) {
     base_.blocks.resize(static_cast<std::size_t>(grid.columns) *
                         static_cast<std::size_t>(grid.rows));
   }
@@ -88,7 +88,7 @@ class GridBase {
 
   std::uint32_t number_of(const Post& p) {
     std::uint32_t& number = number_[at(p)];
-    if (number == kUnset) {
+    if (number == kUnnumbered) {
       BaseBlock& block = base_.blocks[block_of(p)];
       number = static_cast<std::uint32_t>(block.points.size());
       block.points.push_back({.x = p.i, .y = p.j, .z = posts_.z[at(p)]});

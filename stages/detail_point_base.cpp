@@ -18,33 +18,34 @@ namespace qmpipe {
 namespace {
 
 using PlainKernel = CGAL::Simple_cartesian<double>;
-using Place = PlainKernel::Point_2;
+using PlanePoint = PlainKernel::Point_2;
 
 // Integers of 30 bits are doubles without loss.
-Place place_of(const DetailPoint& point) {
+PlanePoint place_of(const DetailPoint& point) {
   return {static_cast<double>(point.x), static_cast<double>(point.y)};
 }
-DetailPoint point_of(const Place& place) {
+DetailPoint point_of(const PlanePoint& place) {
   return {.x = static_cast<std::int32_t>(place.x()), .y = static_cast<std::int32_t>(place.y())};
 }
 
-struct ExactOrientation {
-  CGAL::Orientation operator()(const Place& a, const Place& b, const Place& c) const {
+struct DetailOrientation {
+  CGAL::Orientation operator()(const PlanePoint& a, const PlanePoint& b,
+                               const PlanePoint& c) const {
     return CGAL::sign(plane_orientation(point_of(a), point_of(b), point_of(c)));
   }
 };
 
 // The determinant with d as the origin: areas below 2^62 times squared distances below 2^61.
-struct ExactSideOfCircle {
-  CGAL::Oriented_side operator()(const Place& a, const Place& b, const Place& c,
-                                 const Place& d) const {
+struct DetailSideOfCircle {
+  CGAL::Oriented_side operator()(const PlanePoint& a, const PlanePoint& b, const PlanePoint& c,
+                                 const PlanePoint& d) const {
     __extension__ using Wide = __int128;
     struct Vector {
       std::int64_t x;
       std::int64_t y;
     };
     const DetailPoint centre = point_of(d);
-    const auto from_centre = [&](const Place& place) {
+    const auto from_centre = [&](const PlanePoint& place) {
       const DetailPoint point = point_of(place);
       return Vector{.x = std::int64_t{point.x} - centre.x, .y = std::int64_t{point.y} - centre.y};
     };
@@ -59,9 +60,9 @@ struct ExactSideOfCircle {
 };
 
 // Exact predicates in a few integer operations: no filters, no multiprecision, no rounding modes.
-struct Kernel : PlainKernel {
-  using Orientation_2 = ExactOrientation;
-  using Side_of_oriented_circle_2 = ExactSideOfCircle;
+struct DetailKernel : PlainKernel {
+  using Orientation_2 = DetailOrientation;
+  using Side_of_oriented_circle_2 = DetailSideOfCircle;
   Orientation_2 orientation_2_object() const { return {}; }
   Side_of_oriented_circle_2 side_of_oriented_circle_2_object() const { return {}; }
 };
@@ -81,12 +82,12 @@ void put_in_order(std::vector<std::array<std::uint32_t, 3>>& triangles) {
 enum class Region : std::uint8_t { kUnknown, kBlock };
 
 class HullJoiner {
-  using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<DetailCorner, Kernel>;
-  using FaceInfo = CGAL::Triangulation_face_base_with_info_2<Region, Kernel>;
-  using FaceBase = CGAL::Constrained_triangulation_face_base_2<Kernel, FaceInfo>;
+  using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<DetailCorner, DetailKernel>;
+  using FaceInfo = CGAL::Triangulation_face_base_with_info_2<Region, DetailKernel>;
+  using FaceBase = CGAL::Constrained_triangulation_face_base_2<DetailKernel, FaceInfo>;
   using Data = CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>;
   using Triangulation =
-      CGAL::Constrained_Delaunay_triangulation_2<Kernel, Data,
+      CGAL::Constrained_Delaunay_triangulation_2<DetailKernel, Data,
                                                  CGAL::No_constraint_intersection_tag>;
 
  public:
@@ -183,9 +184,9 @@ std::vector<std::vector<DetailPoint>> split_into_blocks(std::span<const DetailPo
 }
 
 BaseBlock triangulate_block(std::vector<DetailPoint> points) {
-  using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<std::uint32_t, Kernel>;
+  using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<std::uint32_t, DetailKernel>;
   using Data = CGAL::Triangulation_data_structure_2<VertexBase>;
-  CGAL::Delaunay_triangulation_2<Kernel, Data> triangulation;
+  CGAL::Delaunay_triangulation_2<DetailKernel, Data> triangulation;
   decltype(triangulation)::Face_handle near;
   for (std::uint32_t k = 0; k < points.size(); ++k) {
     const auto vertex = triangulation.insert(place_of(points[k]), near);

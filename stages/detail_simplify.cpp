@@ -6,17 +6,16 @@
 #include <limits>
 
 #include "scheduler/check.h"
+#include "stages/array_index.h"
 #include "stages/collapse_queue.h"
 
 namespace qmpipe {
 namespace {
 
 using Index = CollapseMesh::Index;
-using Place = std::array<double, 3>;
+using Position = std::array<double, 3>;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-
-constexpr std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 // The symmetric matrix of Equation 4 by its upper triangle, row by row.
 struct Quadric {
@@ -32,7 +31,7 @@ struct Quadric {
     return *this;
   }
   // Never below zero, which rounding could make it.
-  double error_at(const Place& p) const {
+  double error_at(const Position& p) const {
     const auto& [x, y, z] = p;
     const double xs = q[0] * x + 2 * (q[1] * y + q[2] * z + q[3]);
     const double ys = q[4] * y + 2 * (q[5] * z + q[6]);
@@ -43,7 +42,7 @@ struct Quadric {
 
 struct Vertex {
   Quadric quadric;
-  Place place{};  // relative to the block's middle, so that little is lost in squares
+  Position place{};  // relative to the block's middle, so that little is lost in squares
   double own_error_m2 = 0;
   // Where it would go.
   double least_error_m2 = kNever;
@@ -53,10 +52,10 @@ struct Vertex {
   bool is_on_rim = false;
 };
 
-class Simplifier {
+class DetailSimplifier {
  public:
-  Simplifier(std::span<const DetailPoint> points, std::span<const std::uint32_t> triangles,
-             const DetailFrame& frame)
+  DetailSimplifier(std::span<const DetailPoint> points, std::span<const std::uint32_t> triangles,
+                   const DetailFrame& frame)
       : points_(points),
         mesh_(triangles, points.size()),
         vertices_(points.size()),
@@ -90,17 +89,17 @@ class Simplifier {
 
  private:
   void place_vertices(const DetailFrame& frame) {
-    Place low = frame.place(points_.front());
-    Place high = low;
+    Position low = frame.place(points_.front());
+    Position high = low;
     for (const DetailPoint& point : points_) {
-      const Place place = frame.place(point);
+      const Position place = frame.place(point);
       for (std::size_t k = 0; k < 3; ++k) {
         low[k] = std::min(low[k], place[k]);
         high[k] = std::max(high[k], place[k]);
       }
     }
     for (std::size_t v = 0; v < points_.size(); ++v) {
-      const Place place = frame.place(points_[v]);
+      const Position place = frame.place(points_[v]);
       for (std::size_t k = 0; k < 3; ++k) {
         vertices_[v].place[k] = place[k] - (low[k] + high[k]) / 2;
       }
@@ -111,12 +110,13 @@ class Simplifier {
     for (Index e = 0; e < mesh_.half_edge_count(); e += 3) {
       const std::array<Index, 3> corners = {mesh_.origin(e), mesh_.origin(e + 1),
                                             mesh_.origin(e + 2)};
-      const Place& p = vertices_[at(corners[0])].place;
-      const Place& q = vertices_[at(corners[1])].place;
-      const Place& r = vertices_[at(corners[2])].place;
-      const Place u = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-      const Place v = {r[0] - p[0], r[1] - p[1], r[2] - p[2]};
-      Place n = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+      const Position& p = vertices_[at(corners[0])].place;
+      const Position& q = vertices_[at(corners[1])].place;
+      const Position& r = vertices_[at(corners[2])].place;
+      const Position u = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
+      const Position v = {r[0] - p[0], r[1] - p[1], r[2] - p[2]};
+      Position n = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                    u[0] * v[1] - u[1] * v[0]};
       // Not zero: its z is twice the area seen from above.
       const double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
       for (double& part : n) part /= length;
@@ -250,7 +250,7 @@ DetailRecord simplify_by_quadrics(std::span<const DetailPoint> points,
     QMPIPE_CHECK(0 <= point.x && point.x <= kDetailGridMax);
     QMPIPE_CHECK(0 <= point.y && point.y <= kDetailGridMax);
   }
-  return Simplifier(points, triangles, frame).run(target_triangles, tick);
+  return DetailSimplifier(points, triangles, frame).run(target_triangles, tick);
 }
 
 }  // namespace qmpipe

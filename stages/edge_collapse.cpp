@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "scheduler/check.h"
+#include "stages/array_index.h"
 #include "stages/base_tin.h"
 #include "stages/collapse_queue.h"
 #include "stages/collapse_surface.h"
@@ -13,8 +14,6 @@ namespace {
 
 using Index = CollapseMesh::Index;
 using Candidate = CollapseSurface::Candidate;
-
-constexpr std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 // Costs are kept up to date where a collapse has changed most, on the edges of its vertex. Those
 // farther out are computed again when their turn comes, and wait on when they have become dearer;

@@ -35,7 +35,7 @@ void split_axis(const std::vector<double>& axis, double frequency, std::vector<s
   }
 }
 
-struct Run {
+struct NoiseRun {
   const float* x = nullptr;
   const float* y = nullptr;
   const float* z = nullptr;
@@ -45,7 +45,7 @@ struct Run {
 
 // Points of one cell. The loop has no branches and shares the gradients: compilers make four at a
 // time of it.
-void sample_cell(const std::array<std::array<float, 8>, 3>& g, const Run& run) {
+void sample_cell(const std::array<std::array<float, 8>, 3>& g, const NoiseRun& run) {
   for (std::size_t k = 0; k < run.size; ++k) {
     const float x = run.x[k];
     const float y = run.y[k];

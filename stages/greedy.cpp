@@ -5,6 +5,7 @@
 #include <queue>
 
 #include "scheduler/check.h"
+#include "stages/array_index.h"
 #include "stages/curvature.h"
 #include "stages/delaunay.h"
 
@@ -13,9 +14,7 @@ namespace {
 
 using Index = Delaunay::Index;
 
-constexpr std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-struct Candidate {
+struct NextInsertion {
   float error = 0;
   std::int32_t post = -1;
   Index triangle = Delaunay::kNone;
@@ -24,7 +23,7 @@ struct Candidate {
 
 // The worst post first; of equal ones the one with the lowest index.
 struct LessUrgent {
-  bool operator()(const Candidate& a, const Candidate& b) const {
+  bool operator()(const NextInsertion& a, const NextInsertion& b) const {
     if (a.error != b.error) return a.error < b.error;
     if (a.post != b.post) return a.post > b.post;
     return a.triangle > b.triangle;
@@ -50,7 +49,7 @@ class GreedyInsertion {
   std::vector<TinVertex> vertices_;
   std::vector<std::uint8_t> blocked_;  // posts that are vertices already or lie on a fixed side
   std::vector<std::uint32_t> versions_;
-  std::priority_queue<Candidate, std::vector<Candidate>, LessUrgent> queue_;
+  std::priority_queue<NextInsertion, std::vector<NextInsertion>, LessUrgent> queue_;
 };
 
 GreedyInsertion::GreedyInsertion(const PostGrid& grid, std::span<const float> heights_m,
@@ -136,7 +135,7 @@ void GreedyInsertion::evaluate(Index triangle) {
 Tin GreedyInsertion::run() {
   for (Index t = 0; t < mesh_.triangle_count(); ++t) evaluate(t);
   while (!queue_.empty() && mesh_.triangle_count() < options_.most_triangles) {
-    const Candidate next = queue_.top();
+    const NextInsertion next = queue_.top();
     queue_.pop();
     if (next.version != versions_[at(next.triangle)]) continue;
     if (blocked_[at(next.post)] != 0) {

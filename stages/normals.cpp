@@ -64,12 +64,12 @@ Vec3 normal_at(const Lattice& lattice, const WindowHeights& heights, const PostF
 }
 
 // Between which two columns or rows a place lies, and how far on the way.
-struct Cell {
+struct NormalCell {
   std::int32_t first = 0;
   double part = 0;
 };
 
-Cell cell_of(const std::vector<double>& places, std::int32_t at) {
+NormalCell cell_of(const std::vector<double>& places, std::int32_t at) {
   const auto above = std::upper_bound(places.begin() + 1, places.end() - 1, at);
   const double low = *(above - 1);
   return {.first = static_cast<std::int32_t>(above - places.begin()) - 1,
@@ -100,8 +100,8 @@ std::vector<OctNormal> tile_normals(const TilingScheme& scheme, const TileKey& k
           encode_oct_normal(normal_of(grid.column(vertex.post), grid.row(vertex.post))));
       continue;
     }
-    const Cell east = cell_of(grid.u_exact, vertex.u);
-    const Cell north = cell_of(grid.v_exact, vertex.v);
+    const NormalCell east = cell_of(grid.u_exact, vertex.u);
+    const NormalCell north = cell_of(grid.v_exact, vertex.v);
     const auto row = [&](std::int32_t j) {
       return plus(scaled(normal_of(east.first, j), 1 - east.part),
                   scaled(normal_of(east.first + 1, j), east.part));

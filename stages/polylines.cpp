@@ -57,10 +57,10 @@ class PostSet {
   std::vector<std::uint64_t> words_;
 };
 
-class Simplifier {
+class PolylineSimplifier {
  public:
-  Simplifier(const PostGrid& grid, std::span<const double> heights_m,
-             const std::vector<Polyline>& polylines, double error_m);
+  PolylineSimplifier(const PostGrid& grid, std::span<const double> heights_m,
+                     const std::vector<Polyline>& polylines, double error_m);
   void run();
   // Node by node, what is left of the polylines.
   std::vector<Polyline> result(const std::vector<Polyline>& polylines) const;
@@ -116,8 +116,8 @@ class Simplifier {
   std::priority_queue<Candidate, std::vector<Candidate>, LessUrgent> queue_;
 };
 
-Simplifier::Simplifier(const PostGrid& grid, std::span<const double> heights_m,
-                       const std::vector<Polyline>& polylines, double error_m)
+PolylineSimplifier::PolylineSimplifier(const PostGrid& grid, std::span<const double> heights_m,
+                                       const std::vector<Polyline>& polylines, double error_m)
     : grid_(grid),
       heights_m_(heights_m),
       scale_(flat_scale(grid)),
@@ -135,7 +135,8 @@ Simplifier::Simplifier(const PostGrid& grid, std::span<const double> heights_m,
   }
 }
 
-void Simplifier::add_node(std::int32_t post, double longest_edge, bool is_first, bool is_last) {
+void PolylineSimplifier::add_node(std::int32_t post, double longest_edge, bool is_first,
+                                  bool is_last) {
   const auto index = static_cast<Index>(nodes_.size());
   nodes_.push_back({.post = post,
                     .previous = is_first ? index : index - 1,
@@ -148,7 +149,7 @@ void Simplifier::add_node(std::int32_t post, double longest_edge, bool is_first,
 
 // Of all posts that have gone between the neighbours, this one included; infinite when more than
 // allowed.
-double Simplifier::squared_error_without(const Node& node) const {
+double PolylineSimplifier::squared_error_without(const Node& node) const {
   const IntPoint from = place(nodes_[node.previous].post);
   const IntPoint to = place(nodes_[node.next].post);
   const double across = to.x - from.x;
@@ -166,14 +167,14 @@ double Simplifier::squared_error_without(const Node& node) const {
   return largest;
 }
 
-bool Simplifier::is_edge(std::int32_t a, std::int32_t b) const {
+bool PolylineSimplifier::is_edge(std::int32_t a, std::int32_t b) const {
   const auto& nodes = nodes_of_post_[static_cast<std::size_t>(a)];
   return std::any_of(nodes.begin(), nodes.end(), [&](Index k) {
     return nodes_[nodes_[k].previous].post == b || nodes_[nodes_[k].next].post == b;
   });
 }
 
-bool Simplifier::keeps_topology_without(const Node& node) const {
+bool PolylineSimplifier::keeps_topology_without(const Node& node) const {
   const std::array<std::int32_t, 3> posts = {nodes_[node.previous].post, node.post,
                                              nodes_[node.next].post};
   if (posts[0] == posts[2] || is_edge(posts[0], posts[2])) return false;
@@ -200,7 +201,7 @@ bool Simplifier::keeps_topology_without(const Node& node) const {
   return true;
 }
 
-void Simplifier::enqueue(Index index) {
+void PolylineSimplifier::enqueue(Index index) {
   Node& node = nodes_[index];
   if (!node.removable) return;
   ++node.version;
@@ -209,7 +210,7 @@ void Simplifier::enqueue(Index index) {
   queue_.push({squared_error, node.post, index, node.version});
 }
 
-void Simplifier::remove(Index index) {
+void PolylineSimplifier::remove(Index index) {
   Node& node = nodes_[index];
   node.removed = true;
   nodes_[node.previous].next = node.next;
@@ -219,7 +220,7 @@ void Simplifier::remove(Index index) {
   enqueue(node.next);
 }
 
-void Simplifier::run() {
+void PolylineSimplifier::run() {
   for (Index k = 0; k < nodes_.size(); ++k) enqueue(k);
   while (!queue_.empty()) {
     const Candidate best = queue_.top();
@@ -230,7 +231,7 @@ void Simplifier::run() {
   }
 }
 
-std::vector<Polyline> Simplifier::result(const std::vector<Polyline>& polylines) const {
+std::vector<Polyline> PolylineSimplifier::result(const std::vector<Polyline>& polylines) const {
   std::vector<Polyline> result;
   std::size_t first = 0;
   for (const Polyline& polyline : polylines) {
@@ -249,7 +250,7 @@ std::vector<Polyline> Simplifier::result(const std::vector<Polyline>& polylines)
 std::vector<Polyline> simplify_polylines(const PostGrid& grid, std::span<const double> heights_m,
                                          const std::vector<Polyline>& polylines, double error_m) {
   QMPIPE_CHECK(heights_m.size() == grid.post_count());
-  Simplifier simplifier(grid, heights_m, polylines, error_m);
+  PolylineSimplifier simplifier(grid, heights_m, polylines, error_m);
   simplifier.run();
   return simplifier.result(polylines);
 }

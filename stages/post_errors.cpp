@@ -5,11 +5,9 @@
 #include <limits>
 
 #include "scheduler/check.h"
+#include "stages/array_index.h"
 
 namespace qmpipe {
-namespace {
-constexpr std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
-}  // namespace
 
 PostErrors::HeightRange PostErrors::height_range(std::span<const float> heights_m, double step_m) {
   QMPIPE_CHECK(!heights_m.empty() && step_m > 0);

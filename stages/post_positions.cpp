@@ -29,7 +29,7 @@ double bend(const PixelPoint& a, const PixelPoint& middle, const PixelPoint& b) 
 }
 
 // A square of posts between four anchors, and the anchors halfway.
-struct Cell {
+struct PostCell {
   std::int64_t i = 0;
   std::int64_t j = 0;
   std::int32_t size_posts = 0;
@@ -65,11 +65,11 @@ class CellFiller {
   }
   // The posts a cell fills: its own and, in the lattice's last row of cells, the row that closes
   // it.
-  PostRange posts_of(const Cell& cell) const;
-  void fill(const Cell& cell) const;
-  void interpolate(const Cell& cell, const PostRange& posts) const;
-  void split(const Cell& cell) const;
-  bool is_off_raster(const Cell& cell) const;
+  PostRange posts_of(const PostCell& cell) const;
+  void fill(const PostCell& cell) const;
+  void interpolate(const PostCell& cell, const PostRange& posts) const;
+  void split(const PostCell& cell) const;
+  bool is_off_raster(const PostCell& cell) const;
 
   const RasterGrid& grid_;
   const Lattice& lattice_;
@@ -77,7 +77,7 @@ class CellFiller {
   std::span<PixelPoint> out_;
 };
 
-PostRange CellFiller::posts_of(const Cell& cell) const {
+PostRange CellFiller::posts_of(const PostCell& cell) const {
   const bool is_last = cell.j + cell.size_posts == lattice_.rows() - 1;
   return {.i0 = std::max(cell.i, block_.i0),
           .j0 = std::max(cell.j, block_.j0),
@@ -86,7 +86,7 @@ PostRange CellFiller::posts_of(const Cell& cell) const {
                          block_.j0 + block_.height_posts)};
 }
 
-void CellFiller::fill(const Cell& cell) const {
+void CellFiller::fill(const PostCell& cell) const {
   const PostRange posts = posts_of(cell);
   if (posts.i0 >= posts.i1 || posts.j0 >= posts.j1) return;
   const PostRange closed{
@@ -99,7 +99,7 @@ void CellFiller::fill(const Cell& cell) const {
   }
 }
 
-bool CellFiller::is_off_raster(const Cell& cell) const {
+bool CellFiller::is_off_raster(const PostCell& cell) const {
   const auto [left, right] =
       std::minmax({cell.sw.column, cell.se.column, cell.nw.column, cell.ne.column});
   const auto [top, bottom] = std::minmax({cell.sw.row, cell.se.row, cell.nw.row, cell.ne.row});
@@ -107,7 +107,7 @@ bool CellFiller::is_off_raster(const Cell& cell) const {
          top > static_cast<double>(grid_.info().height) + 1;
 }
 
-void CellFiller::interpolate(const Cell& cell, const PostRange& posts) const {
+void CellFiller::interpolate(const PostCell& cell, const PostRange& posts) const {
   const double step = 1.0 / cell.size_posts;
   for (std::int64_t j = posts.j0; j < posts.j1; ++j) {
     const double up = static_cast<double>(j - cell.j) * step;
@@ -120,7 +120,7 @@ void CellFiller::interpolate(const Cell& cell, const PostRange& posts) const {
   }
 }
 
-void CellFiller::split(const Cell& cell) const {
+void CellFiller::split(const PostCell& cell) const {
   const std::int32_t half = cell.size_posts / 2;
   if (half == 0) {
     const PostRange posts = posts_of(cell);
@@ -129,14 +129,14 @@ void CellFiller::split(const Cell& cell) const {
     return;
   }
   const PixelPoint centre = exact(cell.i + half, cell.j + half);
-  std::array<Cell, 4> quarters;
+  std::array<PostCell, 4> quarters;
   quarters[0] = {.sw = cell.sw, .se = cell.south, .nw = cell.west, .ne = centre};
   quarters[1] = {.sw = cell.south, .se = cell.se, .nw = centre, .ne = cell.east};
   quarters[2] = {.sw = cell.west, .se = centre, .nw = cell.nw, .ne = cell.north};
   quarters[3] = {.sw = centre, .se = cell.east, .nw = cell.north, .ne = cell.ne};
   const std::int32_t quarter = half / 2;
   for (std::size_t k = 0; k < quarters.size(); ++k) {
-    Cell& part = quarters[k];
+    PostCell& part = quarters[k];
     part.i = cell.i + (k % 2 == 1 ? half : 0);
     part.j = cell.j + (k / 2 == 1 ? half : 0);
     part.size_posts = half;

@@ -10,7 +10,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
+constexpr float kVoidPost = std::numeric_limits<float>::quiet_NaN();
 
 // The 3 x 3 posts around a post of the finer zoom, from the south-west.
 struct Neighbourhood {
@@ -32,13 +32,13 @@ float mean_of(const Neighbourhood& posts) {
       weight += w;
     }
   }
-  return weight > 0 ? static_cast<float>(sum / weight) : kVoid;
+  return weight > 0 ? static_cast<float>(sum / weight) : kVoidPost;
 }
 
 // NaN never compares as better, so voids drop out by themselves.
 template <class Better>
 float best_of(const Neighbourhood& posts, const Better& better) {
-  float best = kVoid;
+  float best = kVoidPost;
   for (std::int32_t dj = -1; dj <= 1; ++dj) {
     for (std::int32_t di = -1; di <= 1; ++di) {
       const float height_m = posts.at(di, dj);
@@ -59,7 +59,7 @@ float reduced(const Neighbourhood& posts, Reduction reduction) {
     case Reduction::kMin:
       return best_of(posts, [](float a, float b) { return a < b; });
   }
-  return kVoid;
+  return kVoidPost;
 }
 
 }  // namespace
@@ -78,7 +78,7 @@ void reduce_block(const LatticeStore& store, const TilingScheme& scheme, std::in
   for (std::int32_t j = 0; j < kBlockPosts; ++j) {
     float* row = out.data() + static_cast<std::ptrdiff_t>(j) * kBlockPosts;
     if (!coarse.has_row(first_post_of_block(by) + j)) {
-      std::fill(row, row + kBlockPosts, kVoid);
+      std::fill(row, row + kBlockPosts, kVoidPost);
       continue;
     }
     const float* centre = heights_m.data() + (std::ptrdiff_t{2} * j + 1) * window.width_posts + 1;

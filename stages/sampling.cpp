@@ -42,7 +42,7 @@ struct Strip {
 };
 
 // Rasters of one grid that follow each other in the order of priority: they are sampled at once.
-struct Run {
+struct PixelRun {
   std::size_t first = 0;
   std::size_t last = 0;
   std::size_t grid = 0;
@@ -69,7 +69,7 @@ struct Sampler::Impl {
 
   SourcePool sources;
   GridPixels grids;
-  std::vector<Run> runs;
+  std::vector<PixelRun> runs;
   Resampling resampling;
   // Buffers kept between calls.
   std::vector<PixelPoint> places;
@@ -77,15 +77,15 @@ struct Sampler::Impl {
   // By zoom and row. A value is a pure function of both.
   std::map<std::pair<std::int32_t, std::int64_t>, float> pole_heights_m;
 
-  bool touches(const Run& run, const Lattice& lattice, const PostRange& range) const;
+  bool touches(const PixelRun& run, const Lattice& lattice, const PostRange& range) const;
   void sample_strip(const Lattice& lattice, const Strip& strip);
-  void sample_block(const Run& run, const Lattice& lattice, const Strip& block);
-  void sample_copies(const Run& run, const Strip& block);
-  void sample_part(const Run& run, const Strip& block, const Part& part);
+  void sample_block(const PixelRun& run, const Lattice& lattice, const Strip& block);
+  void sample_copies(const PixelRun& run, const Strip& block);
+  void sample_part(const PixelRun& run, const Strip& block, const Part& part);
   void leave_out_known(const Strip& block);
-  void leave_out_later(const Run& run, const Strip& block, const Part& part,
+  void leave_out_later(const PixelRun& run, const Strip& block, const Part& part,
                        const NeededPixels& needed);
-  void fetch(const Run& run, std::size_t last_raster, const PixelWindow& needed);
+  void fetch(const PixelRun& run, std::size_t last_raster, const PixelWindow& needed);
   std::span<PixelPoint> places_of(const Strip& block, const Part& part, std::size_t row);
   float pole_height_m(const Lattice& lattice, std::int64_t j);
 };
@@ -99,7 +99,8 @@ Sampler::Impl::Impl(SourcePool pool, Resampling method)
   }
 }
 
-bool Sampler::Impl::touches(const Run& run, const Lattice& lattice, const PostRange& range) const {
+bool Sampler::Impl::touches(const PixelRun& run, const Lattice& lattice,
+                            const PostRange& range) const {
   for (std::size_t k = run.first; k <= run.last; ++k) {
     if (touches_bounds(sources.info(k), lattice, range)) return true;
   }
@@ -107,7 +108,7 @@ bool Sampler::Impl::touches(const Run& run, const Lattice& lattice, const PostRa
 }
 
 // The needed window as if the grid went on beyond its edges.
-void Sampler::Impl::fetch(const Run& run, std::size_t last_raster, const PixelWindow& needed) {
+void Sampler::Impl::fetch(const PixelRun& run, std::size_t last_raster, const PixelWindow& needed) {
   const GridInfo& info = sources.grid_info(run.first);
   pixels.resize(needed.size());
   const std::int64_t row0 = std::clamp<std::int64_t>(needed.row0, 0, info.height - 1);
@@ -151,7 +152,7 @@ std::span<PixelPoint> Sampler::Impl::places_of(const Strip& block, const Part& p
 
 // A raster of another grid comes between those of this one: what stands on a pixel that only a later
 // one has is not for this run. Between pixels that it has, the later ones count as neighbours.
-void Sampler::Impl::leave_out_later(const Run& run, const Strip& block, const Part& part,
+void Sampler::Impl::leave_out_later(const PixelRun& run, const Strip& block, const Part& part,
                                     const NeededPixels& needed) {
   fetch(run, run.last, needed.window);
   const RasterShape shape = shape_of(sources.grid_info(run.first));
@@ -166,7 +167,7 @@ void Sampler::Impl::leave_out_later(const Run& run, const Strip& block, const Pa
   }
 }
 
-void Sampler::Impl::sample_part(const Run& run, const Strip& block, const Part& part) {
+void Sampler::Impl::sample_part(const PixelRun& run, const Strip& block, const Part& part) {
   const RasterShape shape = shape_of(sources.grid_info(run.first));
   PlaceBounds bounds(shape);
   for (std::size_t r = 0; r < part.height; ++r) bounds.add(places_of(block, part, r));
@@ -212,7 +213,7 @@ void Sampler::Impl::leave_out_known(const Strip& block) {
 
 // A raster that goes round the globe more than once has a place twice: what is void in its middle may
 // be valid a turn beside it.
-void Sampler::Impl::sample_copies(const Run& run, const Strip& block) {
+void Sampler::Impl::sample_copies(const PixelRun& run, const Strip& block) {
   const GridInfo& info = sources.grid_info(run.first);
   const double turn = columns_round_globe(info);
   const double width = static_cast<double>(info.width);
@@ -231,7 +232,7 @@ void Sampler::Impl::sample_copies(const Run& run, const Strip& block) {
   }
 }
 
-void Sampler::Impl::sample_block(const Run& run, const Lattice& lattice, const Strip& block) {
+void Sampler::Impl::sample_block(const PixelRun& run, const Lattice& lattice, const Strip& block) {
   places.resize(block.posts.size());
   locate_posts(sources.grid(run.first), lattice, block.posts, places);
   leave_out_known(block);
@@ -256,7 +257,7 @@ void Sampler::Impl::sample_strip(const Lattice& lattice, const Strip& strip) {
                             .j0 = posts.j0,
                             .i1 = posts.i0 + posts.width_posts - 1,
                             .j1 = posts.j0 + posts.height_posts - 1};
-      for (const Run& run : runs) {
+      for (const PixelRun& run : runs) {
         if (!touches(run, lattice, range)) continue;
         if (is_full(block)) break;
         sample_block(run, lattice, block);
@@ -332,7 +333,7 @@ bool Sampler::may_cover(const Lattice& lattice, const PostWindow& window) const 
                         .j1 = std::min(window.j0 + window.height_posts, lattice.rows()) - 1};
   if (range.j0 > range.j1) return false;
   return std::any_of(impl_->runs.begin(), impl_->runs.end(),
-                     [&](const Run& run) { return impl_->touches(run, lattice, range); });
+                     [&](const PixelRun& run) { return impl_->touches(run, lattice, range); });
 }
 
 std::int32_t sampling_zoom_for(const TilingScheme& scheme, std::span<const RasterInfo> sources) {

@@ -5,15 +5,14 @@
 #include <limits>
 
 #include "scheduler/check.h"
+#include "stages/array_index.h"
 #include "stages/triangle_scan.h"
 
 namespace qmpipe {
 namespace {
 
-constexpr std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
-
 // One post belongs to each triangle that it lies on the outline of.
-constexpr double kMargin = 1e-6;
+constexpr double kOutlineMargin = 1e-6;
 
 // A grid of means, a void where nothing below is valid; NaN marks it.
 struct Means {
@@ -77,8 +76,8 @@ std::int32_t nearest_post(const PostGrid& grid, double u, double v) {
 bool is_mostly_void(const PostGrid& grid, const IntPoint& a, const IntPoint& b, const IntPoint& c,
                     std::span<const std::uint8_t> valid) {
   PostCount count;
-  const PostRows rows = rows_of_triangle(grid, a, b, c, kMargin);
-  scan_triangle(grid, a, b, c, kMargin, rows.first, rows.last,
+  const PostRows rows = rows_of_triangle(grid, a, b, c, kOutlineMargin);
+  scan_triangle(grid, a, b, c, kOutlineMargin, rows.first, rows.last,
                 [&](std::int32_t j, std::int32_t i_first, std::int32_t i_last) {
                   for (std::int32_t i = i_first; i <= i_last; ++i) {
                     ++count.all;

@@ -76,6 +76,8 @@ def types_of(parameters):
 def name_of_head(head):
     """(kind, name, parameters) of what stands before a `{` at namespace scope, or None."""
     head = without_template(head)
+    if head.startswith("catch"):  # of a function whose whole body is tried
+        return None
     if match := TYPE.match(head):
         return "type", match.group(1), ""
     function = FUNCTION.search(head)
@@ -174,19 +176,27 @@ def defined_names(text):
 def defined_twice(files, is_alone=lambda path: False):
     """What is wrong in {path: text}, as lines. A header's name belongs to it alone: another header,
     or a source file that gives it another meaning, in an unnamed namespace too, is a fault; so are
-    types of one name in two source files that the linker would take for one. Functions may be
+    types of one name in two source files that the linker would take for one; and what two source
+    files of a folder have in unnamed namespaces, for they may be compiled as one. Functions may be
     overloaded, so their parameters count. `is_alone(path)`: what that source file has in unnamed
     namespaces concerns nobody."""
     first_of = {}
+    first_local = {}
     faults = []
     # Headers first: where a source file takes a header's name, the source file is at fault.
     for path in sorted(files, key=lambda p: (p.suffix != ".h", p)):
         for name in defined_names(files[path]):
-            if path.suffix != ".h" and name.kind == "function":
-                continue  # the linker sees those
             if path.suffix != ".h" and name.is_local and is_alone(path):
                 continue
             key = name.name, name.parameters if name.kind == "function" else None
+            # Aliases may be repeated; where they differ, the compiler says so.
+            if path.suffix != ".h" and name.is_local and name.kind != "alias":
+                other_path, line = first_local.setdefault((path.parts[0], key), (path, name.line))
+                if other_path != path:
+                    faults.append(f"{path}:{name.line}: {name.name} is defined in {other_path}:{line} too, "
+                                  "in an unnamed namespace as here; give one of them another name")
+            if path.suffix != ".h" and name.kind == "function":
+                continue  # the linker sees those
             is_shared = path.suffix == ".h" or (name.kind == "type" and not name.is_local)
             other_path, line = first_of.get(key, (path, 0))
             if other_path != path and (other_path.suffix == ".h" or is_shared):

@@ -200,7 +200,7 @@ GOOD_TREE = {
     "build/formats/a.h": "no header of ours\n",
     "tests/__pycache__/a.h": "no header of ours\n",
     # Names that are no second definition: a declaration, a private class, an overload, another
-    # namespace, a member, a text, a comment, two unnamed namespaces, a test's own.
+    # namespace, a member, a text, a comment, unnamed namespaces of two layers, a test's own.
     "stages/names.h": "// N.\n#pragma once\nnamespace qmpipe {\nclass Store;\n"
                       "struct Post { int i; };\ninline constexpr int kWide = 1;\n"
                       "inline int size_of(const Post& p) { return p.i; }\n"
@@ -215,7 +215,11 @@ GOOD_TREE = {
                         "struct Store::Impl { int Post = 1; };\nclass Own {};\n}\n",
     "stages/names.cpp": '#include "stages/names.h"\n'
                         "namespace fs = std::filesystem;\nnamespace qmpipe {\nnamespace {\n"
-                        "struct Entry { long k; };\n}\nint f() { struct Post {}; return 0; }\n}\n",
+                        "using Number = long;\n}\nint f() { struct Post {}; return 0; }\n}\n",
+    "pipeline/names.cpp": "namespace qmpipe {\nnamespace {\nstruct Entry { long k; };\n"
+                          "int f() try {\n  return 1;\n} catch (int) {\n  return 0;\n}\n}\n}\n",
+    "pipeline/tries.cpp": "namespace qmpipe {\nnamespace {\n"
+                          "int g() try {\n  return 1;\n} catch (int) {\n  return 0;\n}\n}\n}\n",
     "tests/names_test.cpp": "namespace qmpipe {\nnamespace {\nstruct Post { int x; };\n}\n}\n",
 }
 
@@ -271,6 +275,8 @@ FAULTS = [
     ("stages/b.cpp", "namespace qmpipe {\nnamespace {\nstruct Post {};\n}\n}\n",
      "stages/b.cpp:3: qmpipe::Post is defined in stages/names.h:5 too"),
     ("tests/b.cpp", "namespace qmpipe {\nstruct Post {};\n}\n", "Post is defined"),
+    ("stages/z.cpp", "namespace qmpipe {\nnamespace {\nclass Entry {};\n}\n}\n",
+     "stages/z.cpp:3: qmpipe::Entry is defined in stages/store.cpp:5 too, in an unnamed"),
     # `Entry` is not the linker's in the others; `Own` is.
     ("stages/z.cpp", "namespace qmpipe {\nstruct Entry {};\nclass Own {};\n}\n", "Own is defined"),
 ]

@@ -12,7 +12,7 @@ namespace qmpipe {
 namespace {
 
 // Digits only; what does not fit is the largest number, which is past the end of any body.
-std::optional<std::uint64_t> number_of(std::string_view digits) {
+std::optional<std::uint64_t> position_of(std::string_view digits) {
   if (digits.empty() || digits.find_first_not_of("0123456789") != std::string_view::npos) {
     return std::nullopt;
   }
@@ -35,12 +35,12 @@ std::optional<Span> span_of(std::string_view range, std::uint64_t size) {
   if (dash == std::string_view::npos) return std::nullopt;
   const std::string_view from = range.substr(0, dash);
   const std::string_view to = range.substr(dash + 1);
-  const std::optional<std::uint64_t> last = number_of(to);
+  const std::optional<std::uint64_t> last = position_of(to);
   if (from.empty()) {  // the last so many bytes
     if (!last) return std::nullopt;
     return Span{size - std::min(*last, size), size - 1};
   }
-  const std::optional<std::uint64_t> first = number_of(from);
+  const std::optional<std::uint64_t> first = position_of(from);
   if (!first || (!last && !to.empty()) || (last && *last < *first)) return std::nullopt;
   return Span{*first, std::min(last.value_or(size), size - 1)};
 }

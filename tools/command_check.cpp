@@ -6,6 +6,7 @@
 #include <string>
 
 #include "pipeline/check_url.h"
+#include "tools/exit_codes.h"
 #include "tools/help_format.h"
 #include "tools/http_client.h"
 #include "tools/interrupt.h"
@@ -14,9 +15,8 @@ namespace qmpipe {
 namespace {
 
 constexpr int kExitUnanswered = 1;
-constexpr int kExitFaults = 3;
 
-constexpr const char* kFooter =
+constexpr const char* kCheckFooter =
     "Asks for layer.json and for a sample of tiles as CesiumJS on a page of another site would,\n"
     "and says in plain words what is wrong, what a viewer shows because of it, and what to do:\n"
     "no CORS header; gzip that is not announced; web pages instead of tiles; a layer.json that\n"
@@ -61,7 +61,7 @@ void register_check(CLI::App& app, std::function<int()>& action) {
   const auto arguments = std::make_shared<CheckArguments>();
   CLI::App* command = app.add_subcommand(
       "check", "Look at a tile set on a web server as viewers would, and say what is wrong");
-  command->footer(kFooter);
+  command->footer(kCheckFooter);
   begin_group(*command, kInputGroup);
   command
       ->add_option("URL", arguments->address,

@@ -16,6 +16,7 @@
 #include "pipeline/compare.h"
 #include "pipeline/compare_page.h"
 #include "pipeline/compare_tables.h"
+#include "tools/exit_codes.h"
 #include "tools/help_format.h"
 #include "tools/interrupt.h"
 #include "tools/parse_values.h"
@@ -24,9 +25,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr int kExitFaults = 3;
-
-constexpr const char* kFooter =
+constexpr const char* kCompareFooter =
     "Builds a pyramid with each method, verifies it, and measures every tile without voids "
     "against\n"
     "the posts it was made from. REPORT becomes a folder with\n"
@@ -171,7 +170,7 @@ void register_compare(CLI::App& app, std::function<int()>& action) {
   begin_group(*command, kMessagesGroup);
   command->add_flag("--json", arguments->json,
                     "All numbers as JSON on stdout, progress as JSON lines on stderr");
-  command->footer(kFooter);
+  command->footer(kCompareFooter);
   command->callback(
       [arguments, &action] { action = [arguments] { return run_compare(*arguments); }; });
 }

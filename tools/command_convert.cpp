@@ -29,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFooter =
+constexpr const char* kConvertFooter =
     "A set has one of three forms, told by the output's name: OUT.mbtiles (SQLite, for tile\n"
     "servers), OUT.pmtiles (for any store that answers range requests), else a folder. Sets of\n"
     "other programs too. The bytes of every tile stay as they are, unless --gzip says otherwise;\n"
@@ -154,7 +154,7 @@ void register_one(CLI::App& app, std::function<int()>& action, const char* name,
   arguments->demand = demand;
   arguments->threads = usable_threads();
   CLI::App* command = app.add_subcommand(name, description);
-  command->footer(kFooter);
+  command->footer(kConvertFooter);
   begin_group(*command, kOutputGroup);
   command
       ->add_option(

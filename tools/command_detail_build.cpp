@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kDetailBuildFooter =
     "The terrain is cut into blocks by the middles of x and y, each is triangulated and then\n"
     "simplified by quadric errors down to --keep of its triangles, and every step is kept. The\n"
     "model is the same on any number of threads. An existing FILE is replaced.\n"
@@ -37,7 +37,7 @@ constexpr const char* kFooter =
     "  qmpipe detail build dem.tif -o terrain.h5 --blocks 64 --keep 5% --interval 1000\n"
     "Exit codes: 0 written, 1 failed, 2 wrong usage, 130 interrupted.";
 
-struct BuildArguments {
+struct DetailBuildArguments {
   DetailBuildOptions options;
   HeightArguments heights;
   std::string output;
@@ -58,7 +58,7 @@ double parse_keep(const std::string& text) {
   throw UsageError(fmt::format("--keep {}: give a share, as 20% or 0.2", text));
 }
 
-void print_text(const BuildArguments& arguments, const DetailBuilt& built,
+void print_text(const DetailBuildArguments& arguments, const DetailBuilt& built,
                 std::uintmax_t file_bytes) {
   const DetailBuildReport& report = built.report;
   const auto line = [](const char* name, const std::string& value) {
@@ -80,7 +80,7 @@ void print_text(const BuildArguments& arguments, const DetailBuilt& built,
   line("peak memory", fmt::format("{} bytes", peak_resident_bytes()));
 }
 
-void print_json(const BuildArguments& arguments, const DetailBuilt& built,
+void print_json(const DetailBuildArguments& arguments, const DetailBuilt& built,
                 std::uintmax_t file_bytes) {
   const DetailBuildReport& report = built.report;
   const Json document = {{"model", arguments.output},
@@ -100,7 +100,7 @@ void print_json(const BuildArguments& arguments, const DetailBuilt& built,
   fmt::print("{}\n", document.dump(2));
 }
 
-int run_build(BuildArguments arguments) {
+int run_build(DetailBuildArguments arguments) {
   arguments.options.keep_share = parse_keep(arguments.keep);
   if (!arguments.classes.empty()) {
     arguments.options.points.classes = parse_point_classes(arguments.classes);
@@ -125,12 +125,12 @@ int run_build(BuildArguments arguments) {
 }  // namespace
 
 void register_detail_build(CLI::App& detail, std::function<int()>& action) {
-  const auto arguments = std::make_shared<BuildArguments>();
+  const auto arguments = std::make_shared<DetailBuildArguments>();
   DetailBuildOptions& options = arguments->options;
   options.threads = usable_threads();
   CLI::App* command =
       detail.add_subcommand("build", "Turn points or a DEM into a detail-increment model");
-  command->footer(kFooter);
+  command->footer(kDetailBuildFooter);
   begin_group(*command, kPapersGroup);
   command
       ->add_option(

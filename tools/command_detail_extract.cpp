@@ -22,7 +22,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kDetailExtractFooter =
     "One of --svo, --triangles, --level, --distance and --eye says how fine the mesh is:\n"
     "  --svo D          of each block the coarsest level whose smallest visible object is no "
     "larger\n"
@@ -181,7 +181,7 @@ void add_view_options(CLI::App& command, DetailView& view) {
 void register_detail_extract(CLI::App& detail, std::function<int()>& action) {
   const auto arguments = std::make_shared<ExtractArguments>();
   CLI::App* command = detail.add_subcommand("extract", "Write the mesh of a scale");
-  command->footer(kFooter);
+  command->footer(kDetailExtractFooter);
   command->add_option("FILE", arguments->path, "The model")->required();
   command
       ->add_option("-o,--output", arguments->output,

@@ -16,6 +16,7 @@
 #include "pipeline/detail_verify.h"
 #include "pipeline/machine_share.h"
 #include "tools/detail_commands.h"
+#include "tools/exit_codes.h"
 #include "tools/help_format.h"
 #include "tools/interrupt.h"
 
@@ -24,15 +25,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kExitFaults = 3;
-
-struct VerifyArguments {
+struct DetailVerifyArguments {
   std::string path;
   std::int32_t threads = 1;
   bool json = false;
 };
 
-int run_verify(const VerifyArguments& arguments) {
+int run_verify(const DetailVerifyArguments& arguments) {
   const DetailModel model = load_model(arguments.path);
   Progress progress(
       ::isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent,
@@ -52,7 +51,7 @@ int run_verify(const VerifyArguments& arguments) {
   return report.faults.empty() ? 0 : kExitFaults;
 }
 
-struct InfoArguments {
+struct DetailInfoArguments {
   std::string path;
   std::string chart;
   DetailView view;
@@ -69,7 +68,7 @@ Json block_json(const DetailBlock& block) {
           {"finest_svo_m", block.svo_m.back()}};
 }
 
-void print_info(const InfoArguments& arguments, const DetailModel& model) {
+void print_info(const DetailInfoArguments& arguments, const DetailModel& model) {
   std::error_code code;
   fmt::print("{}: {} bytes, {} blocks, {} triangles in seams, interval {}\n",
              printable_line(arguments.path), std::filesystem::file_size(arguments.path, code),
@@ -115,7 +114,7 @@ Json increments_json(const IncrementSums& sums) {
           {"raw_bytes_merged", sums.raw_bytes_merged}};
 }
 
-int run_info(const InfoArguments& arguments) {
+int run_info(const DetailInfoArguments& arguments) {
   const DetailModel model = load_model(arguments.path);
   if (!arguments.chart.empty()) {
     const std::string page = detail_chart_page(model, arguments.view, arguments.path);
@@ -148,7 +147,7 @@ int run_info(const InfoArguments& arguments) {
 }  // namespace
 
 void register_detail_verify(CLI::App& detail, std::function<int()>& action) {
-  const auto arguments = std::make_shared<VerifyArguments>();
+  const auto arguments = std::make_shared<DetailVerifyArguments>();
   arguments->threads = usable_threads();
   CLI::App* command =
       detail.add_subcommand("verify", "Check a model by walking through its levels");
@@ -177,7 +176,7 @@ void register_detail_verify(CLI::App& detail, std::function<int()>& action) {
 }
 
 void register_detail_info(CLI::App& detail, std::function<int()>& action) {
-  const auto arguments = std::make_shared<InfoArguments>();
+  const auto arguments = std::make_shared<DetailInfoArguments>();
   CLI::App* command = detail.add_subcommand("info", "Show what a model holds");
   command->footer(
       "svo: the smallest visible object of a level, metres.\n"

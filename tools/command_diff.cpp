@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kExitDifferent = 3;
 
-constexpr const char* kFooter =
+constexpr const char* kDiffFooter =
     "Compares layer.json key by key, then tile by tile: those of one set only; those with the "
     "same\n"
     "bytes; those that are the same once unpacked; and those that differ, in what: header, number\n"
@@ -63,7 +63,7 @@ void register_diff(CLI::App& app, std::function<int()>& action) {
   options.threads = usable_threads();
   CLI::App* command = app.add_subcommand(
       "diff", "Compare two tile sets: layer.json, which tiles there are, and what differs in them");
-  command->footer(kFooter);
+  command->footer(kDiffFooter);
   command->add_option("A", arguments->a, "A tile set")->required();
   command->add_option("B", arguments->b, "Another one")->required();
   begin_group(*command, kResourcesGroup);

@@ -15,7 +15,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kInfoFooter =
     "Sizes are in bytes, heights in metres above the WGS84 ellipsoid, positions in metres.\n"
     "Exit code 1: layer.json is missing or damaged, or the tile is missing or damaged.\n"
     "\n"
@@ -113,7 +113,7 @@ void register_info(CLI::App& app, std::function<int()>& action) {
                    "else geodetic")
       ->needs(mesh)
       ->check(CLI::IsMember({"geodetic", "mercator"}));
-  command->footer(kFooter);
+  command->footer(kInfoFooter);
   command->callback(
       [arguments, &action] { action = [arguments] { return run_info(*arguments); }; });
 }

@@ -29,7 +29,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kServeFooter =
     "A tile set opens with a page that shows the terrain in CesiumJS, lit and coloured by\n"
     "height. In a page of your own:\n"
     "  Cesium.CesiumTerrainProvider.fromUrl(\"http://127.0.0.1:8080/tiles\")\n"
@@ -149,7 +149,7 @@ void register_serve(CLI::App& app, std::function<int()>& action) {
   const auto arguments = std::make_shared<ServeArguments>();
   CLI::App* command = app.add_subcommand(
       "serve", "Serve a tile set or a detail-increment model over HTTP, with a page that shows it");
-  command->footer(kFooter);
+  command->footer(kServeFooter);
   command
       ->add_option("OUT", arguments->path,
                    "The tile set: its folder, an .mbtiles or a .pmtiles file, ours or another "

@@ -21,13 +21,13 @@ namespace {
 
 constexpr std::int64_t kLargestSide = 10'000'000;
 
-struct Size {
+struct GridExtent {
   std::int64_t width = 0;
   std::int64_t height = 0;
 };
 
-Size parse_size(const std::string& text) {
-  Size size;
+GridExtent parse_extent(const std::string& text) {
+  GridExtent size;
   char rest = '\0';
   long long width = 0;
   long long height = 0;
@@ -125,7 +125,7 @@ void write_terrain(RasterWriter& writer, SynthTerrain& terrain, const RasterWrit
 }  // namespace
 
 int run_synth(const SynthOptions& options) {
-  const Size size = parse_size(options.size);
+  const GridExtent size = parse_extent(options.size);
   const RectangleDeg bounds = parse_bounds(options.bounds_deg);
   if (!(options.void_share >= 0 && options.void_share <= 1)) {
     throw UsageError("--voids must be a share from 0 to 1, for example 0.02");

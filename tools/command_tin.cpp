@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFooter =
+constexpr const char* kTinFooter =
     "Without --tolerance and --triangles the method's parameters decide. Their defaults here are\n"
     "those of Campos et al. 2020 for single DEMs (Table 2): g_e=5 g_g=0 e_e=2000 p_e=100 p_b=5\n"
     "p_m=10 r_r=98.5 d_g=1000 h_c=150 h_v=1e-4 w_p=1.5 w_r=25 w_i=15; of a series by zoom the\n"
@@ -276,7 +276,7 @@ void add_options(CLI::App& command, TinArguments& arguments) {
   begin_group(command, kMessagesGroup);
   command.add_flag("--json", arguments.json, "Print the statistics as JSON");
   command.add_flag("-v,--verbose", arguments.verbose, "Print every effective option first");
-  command.footer(kFooter);
+  command.footer(kTinFooter);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "pipeline/machine_share.h"
 #include "pipeline/progress.h"
 #include "pipeline/verify.h"
+#include "tools/exit_codes.h"
 #include "tools/height_arguments.h"
 #include "tools/help_format.h"
 #include "tools/interrupt.h"
@@ -19,9 +20,7 @@
 namespace qmpipe {
 namespace {
 
-constexpr int kExitFaults = 3;
-
-constexpr const char* kFooter =
+constexpr const char* kVerifyFooter =
     "Checks every tile: that it can be read under the strictest reading of the format; that its\n"
     "triangles are counter-clockwise and cover the tile's square exactly once; corners and side\n"
     "lists; the header's height range, bounding sphere and horizon occlusion point; that CesiumJS\n"
@@ -85,7 +84,7 @@ void register_verify(CLI::App& app, std::function<int()>& action) {
   CLI::App* command = app.add_subcommand(
       "verify",
       "Check a finished tile set: tiles, cracks, layer.json, and heights against a source");
-  command->footer(kFooter);
+  command->footer(kVerifyFooter);
   begin_group(*command, kInputGroup);
   command
       ->add_option("OUT", arguments->path,

@@ -31,10 +31,6 @@ void add_planes(std::span<const std::uint32_t> words, std::vector<std::uint8_t>&
   }
 }
 
-std::string etag_of(std::span<const std::uint8_t> bytes) {
-  return fmt::format("{:016x}", hash64(bytes, 0));
-}
-
 Json box_of(const DetailBlock& block, const DetailFrame& frame) {
   if (block.points.empty()) return nullptr;
   DetailPoint low = block.points.front();

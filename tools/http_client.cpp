@@ -23,9 +23,6 @@ constexpr long kMostRedirects = 5;
 // Of all answers of one request, redirections included.
 constexpr std::size_t kMostHeaderBytes = std::size_t{256} << 10U;
 
-struct FreeHandle {
-  void operator()(CURL* handle) const { curl_easy_cleanup(handle); }
-};
 struct FreeList {
   void operator()(curl_slist* list) const { curl_slist_free_all(list); }
 };
@@ -136,6 +133,9 @@ std::string words_for(CURLcode code, const std::string& detail, double timeout_s
 }  // namespace
 
 struct HttpClient::Impl {
+  struct FreeHandle {
+    void operator()(CURL* easy) const { curl_easy_cleanup(easy); }
+  };
   std::unique_ptr<CURL, FreeHandle> handle;
   double timeout_s = 0;
   const std::atomic<bool>* stop = nullptr;

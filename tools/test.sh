@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Sets up, builds and tests qmpipe, from a fresh clone on a bare Debian 12.
 #   tools/test.sh        what a change needs: the preset `dev` and its tests
-#   tools/test.sh --ci   also: format, address/undefined and thread sanitizers, fuzzing, clang-tidy
+#   tools/test.sh --ci   also: format, the program as users get it, address/undefined and thread sanitizers, fuzzing,
+#                        clang-tidy
 # Every phase runs, whatever failed before it. The last line is "N passed, N failed[, N skipped]":
 # the tests of all phases, where a check without tests of its own (format, clang-tidy, a fuzz
 # target) counts as one, and a build counts only when it fails.
@@ -52,10 +53,11 @@ check() {
   if [ "$failed" -eq "$before" ]; then passed=$((passed + 1)); fi
 }
 
+# configure_and_build PRESET [CONFIGURE_PRESET]
 configure_and_build() {
   mkdir -p build
   # The listing of the configure step matters only when it fails.
-  cmake --preset "$1" >"build/$1-configure.log" 2>&1 || { cat "build/$1-configure.log"; return 1; }
+  cmake --preset "${2:-$1}" >"build/$1-configure.log" 2>&1 || { cat "build/$1-configure.log"; return 1; }
   cmake --build --preset "$1" -j "$jobs" -- -k 0 >"build/$1-build.log" 2>&1 ||
     { grep -vE '^\[[0-9]+/[0-9]+\] (Building|Linking) ' "build/$1-build.log"; return 1; }
 }
@@ -91,8 +93,9 @@ PYTHON
     "$preset" "$run" "$bad" "$left_out" $((SECONDS - start))
 }
 
+# build_and_test PRESET [CONFIGURE_PRESET]
 build_and_test() {
-  phase "$1: build" configure_and_build "$1"
+  phase "$1: build" configure_and_build "$@"
   ctest_phase "$1"
 }
 
@@ -133,7 +136,7 @@ layers = ["scheduler", "formats", "stages", "pipeline", "tools"]
 files = {os.path.relpath(entry["file"]) for entry in json.load(open("build/dev/compile_commands.json"))}
 files = {f for f in files if f.split(os.sep)[0] in layers}
 git = lambda *words: subprocess.run(["git", *words], capture_output=True, text=True)
-diff = git("diff", "--name-only", "HEAD~20")
+diff = git("diff", "--name-only", "HEAD~10")
 count = git("rev-list", "--count", "HEAD")
 if diff.returncode == 0 and count.returncode == 0 and "QMPIPE_TIDY_ALL" not in os.environ:
     changed = {os.path.splitext(f)[0] for f in diff.stdout.splitlines()}
@@ -222,6 +225,7 @@ if [ "$mode" = --ci ]; then start_tidy; fi
 ctest_phase dev
 if [ "$mode" = --ci ]; then
   check 'format' format_check
+  build_and_test release-tests release
   build_and_test asan
   build_and_test tsan
   fuzz

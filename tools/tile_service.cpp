@@ -44,11 +44,11 @@ bool has_it(const std::string& if_none_match, const std::string& quoted_etag) {
   return found;
 }
 
+}  // namespace
+
 std::string etag_of(std::span<const std::uint8_t> bytes) {
   return fmt::format("{:016x}", hash64(bytes, 0));
 }
-
-}  // namespace
 
 bool accepts_gzip(const std::string& accept_encoding) {
   bool accepts = false;

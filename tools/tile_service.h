@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -42,6 +43,9 @@ bool accepts_gzip(const std::string& accept_encoding);
 
 // {"error": "..."} with that status.
 HttpReply error_reply(int status, const std::string& message);
+
+// Of a body, without quotes.
+std::string etag_of(std::span<const std::uint8_t> bytes);
 
 // 200 with the body, or 304 without it when the client has it; `etag` without quotes.
 HttpReply cached_reply(const HttpRequest& request, std::string media_type, std::string body,
