@@ -124,10 +124,12 @@ std::optional<DataCover> data_cover(const Survey& survey) {
 std::string with_cover(const std::string& recipe_json, const DataCover& cover) {
   nlohmann::ordered_json object = nlohmann::ordered_json::parse(recipe_json);
   const RectangleDeg& box = cover.posts_deg;
-  // A line each, as the file is laid out.
   std::vector<std::string> rows;
-  for (const std::vector<std::int32_t>& turns : cover.rows) {
-    rows.push_back(fmt::format("{}", fmt::join(turns, " ")));
+  for (auto from = cover.rows.begin(); from != cover.rows.end();) {
+    const auto to =
+        std::find_if(from, cover.rows.end(), [from](const auto& turns) { return turns != *from; });
+    rows.push_back(fmt::format("{}: {}", to - from, fmt::join(*from, " ")));
+    from = to;
   }
   object["data"] = {
       {"posts_deg", std::array{box.west_deg, box.south_deg, box.east_deg, box.north_deg}},

@@ -28,7 +28,7 @@ struct DataCover {
 std::optional<DataCover> data_cover(const Survey& survey);
 
 // The JSON object of a recipe with the cover as its member "data":
-// {"posts_deg":[west,south,east,north],"columns":n,"rows":["0 12 3 5",...]}
+// {"posts_deg":[west,south,east,north],"columns":n,"rows":["17: 0 12 3 5",...]}, where 17 rows are alike.
 std::string with_cover(const std::string& recipe_json, const DataCover& cover);
 
 }  // namespace qmpipe

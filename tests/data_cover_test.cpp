@@ -187,12 +187,12 @@ TEST(DataCover, StandsInTheRecipeAsLinesOfNumbers) {
   const DataCover cover = {
       .posts_deg = {.west_deg = 5, .south_deg = 43, .east_deg = 6.5, .north_deg = 44},
       .columns = 4,
-      .rows = {{0, 4}, {1, 2}, {}}};
+      .rows = {{0, 4}, {1, 2}, {1, 2}, {}}};
   const auto object = nlohmann::json::parse(with_cover(R"({"scheme":"geodetic"})", cover));
   EXPECT_EQ(object.at("scheme"), "geodetic");
   EXPECT_EQ(object.at("data"),
             nlohmann::json::parse(R"({"posts_deg":[5.0,43.0,6.5,44.0],"columns":4,
-                                                         "rows":["0 4","1 2",""]})"));
+                                                         "rows":["1: 0 4","2: 1 2","1: "]})"));
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ test('bounds of layer.json are taken where they tell where the data are', () => 
   assert.deepEqual(extentOf({ bounds: [6, 43, 8, 45], available }), [6, 43, 8, 45]);
   assert.deepEqual(extentOf({ bounds: [170, -20, -170, -10] }), [170, -20, 190, -10]);
   assert.deepEqual(extentOf({ bounds: [-180, -30, 180, -10], available }), [90, -30, 270, -10]);
-  const data = { posts_deg: [100, -29, 200, -11], columns: 51, rows: ['0 51', '3 4'] };
+  const data = { posts_deg: [100, -29, 200, -11], columns: 51, rows: ['1: 0 51', '1: 3 4'] };
   assert.deepEqual(extentOf({ bounds: [-180, -30, 180, -10], available, qmpipe: { data } }), [99, -30, 201, -10]);
   data.posts_deg = [-180, -29, 179, -11];
   data.columns = 360;
@@ -96,10 +96,10 @@ test('bounds of layer.json are taken where they tell where the data are', () => 
 });
 
 test('where the data are, of rows of posts', () => {
-  const data = { posts_deg: [5, 43, 6.5, 44], columns: 4, rows: ['0 4', '1 2', ''] };
+  const data = { posts_deg: [5, 43, 6.5, 44], columns: 4, rows: ['1: 0 4', '2: 1 2', '1: '] };
   const flags = (cover) => cover.rows.map((row) => row.join(''));
   const cover = coverOf({ qmpipe: { data }, projection: 'EPSG:4326' });
-  assert.deepEqual(flags(cover), ['1111', '0110', '0000']);
+  assert.deepEqual(flags(cover), ['1111', '0110', '0110', '0000']);
   assert.deepEqual([cover.postsDeg, cover.columns], [[5, 43, 6.5, 44], 4]);
   assert.equal(coverOf({ qmpipe: {} }), null);
   assert.equal(coverOf({}), null);
@@ -107,10 +107,12 @@ test('where the data are, of rows of posts', () => {
                        { ...data, posts_deg: [1, 2, 'x', 4] }, { ...data, posts_deg: null }]) {
     assert.equal(coverOf({ qmpipe: { data: wrong } }), null, JSON.stringify(wrong));
   }
-  assert.deepEqual(flags(coverOf({ qmpipe: { data: { ...data, rows: [null, 'x 1', '9 9 -3 7'] } } })),
-                   ['0000', '0000', '0000']);
+  for (const text of [null, 7, 'x 1', '9 9', '1: 9 -3', '0: 1', '1e9: 1', '99999: 1', '1:  2']) {
+    assert.equal(coverOf({ qmpipe: { data: { ...data, rows: [text] } } }), null, `${text}`);
+  }
+  assert.deepEqual(flags(coverOf({ qmpipe: { data: { ...data, rows: ['1: 9 9 3 7'] } } })), ['0000']);
   // Mercator's rows in the south of a tall box are farther apart in degrees than those in the north.
-  const tall = { posts_deg: [0, 0, 1, 80], columns: 1, rows: ['0 1', '', '', '', '', '', '', ''] };
+  const tall = { posts_deg: [0, 0, 1, 80], columns: 1, rows: ['1: 0 1', '7: '] };
   const rows = flags(coverOf({ qmpipe: { data: tall }, projection: 'EPSG:3857' }));
   assert.equal(rows.length, 16);
   assert.deepEqual(rows, [...Array(rows.lastIndexOf('1') + 1).fill('1'),

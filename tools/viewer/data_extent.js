@@ -7,14 +7,15 @@ const wholeTurn = 360;
 export function coverOf(layer) {
   const data = layer.qmpipe?.data;
   if (!isCover(data)) return null;
-  const rows = data.rows.map((text) => {
+  const rows = data.rows.flatMap((text) => {
+    const [times, turns] = text.split(':');
     const row = new Uint8Array(data.columns);
     let at = 0;
-    `${text}`.split(' ').forEach((count, turn) => {
+    turns.trim().split(' ').forEach((count, turn) => {
       row.fill(turn % 2, at, at + Number(count));
       at += Number(count);
     });
-    return row;
+    return Array(Number(times)).fill(row);
   });
   const { posts_deg: postsDeg, columns } = data;
   if (layer.projection !== 'EPSG:3857' || rows.length < 2) return { postsDeg, columns, rows };
@@ -30,7 +31,8 @@ export function coverOf(layer) {
 // Whoever made the set: what is no picture of sensible size is none.
 function isCover(data) {
   const isCount = (count) => Number.isInteger(count) && count > 0 && count <= 4096;
-  return Array.isArray(data?.rows) && isCount(data.rows.length) && isCount(data.columns) &&
+  return Array.isArray(data?.rows) && data.rows.every((text) => /^\d+:( \d+)* ?$/.test(text)) &&
+      isCount(data.rows.reduce((sum, text) => sum + parseInt(text, 10), 0)) && isCount(data.columns) &&
       Array.isArray(data.posts_deg) && data.posts_deg.length === 4 && data.posts_deg.every(Number.isFinite);
 }
 
