@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <span>
@@ -68,6 +69,9 @@ std::optional<PostWindow> window_of_data(const Survey& survey, const Lattice& la
     }
   }
   if (rows.empty()) return std::nullopt;
+  const PoleHeights& poles = survey.pole_heights[static_cast<std::size_t>(lattice.zoom())];
+  if (poles[0] && *rows.begin() == 1) rows.insert(0);
+  if (poles[1] && *rows.rbegin() == lattice.rows() - 2) rows.insert(lattice.rows() - 1);
   return around(columns, rows, lattice.columns());
 }
 
@@ -95,8 +99,12 @@ DataCover cover_of(const LatticeStore& store, const Lattice& lattice, const Post
                      .north_deg = lattice.latitude_deg(window.j0 + window.height_posts - 1)};
   cover.columns = window.width_posts;
   const auto width = static_cast<std::size_t>(window.width_posts);
-  for (std::size_t at = 0; at < heights_m.size(); at += width) {
-    cover.rows.push_back(turns_of(std::span(heights_m).subspan(at, width)));
+  for (std::int32_t row = 0; row < window.height_posts; ++row) {
+    // A pole is one place, and in the window only where it has a height.
+    const bool is_pole = lattice.is_pole_row(window.j0 + row);
+    const std::size_t at = static_cast<std::size_t>(row) * width;
+    cover.rows.push_back(is_pole ? std::vector<std::int32_t>{0, window.width_posts}
+                                 : turns_of(std::span(heights_m).subspan(at, width)));
   }
   return cover;
 }

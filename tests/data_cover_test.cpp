@@ -183,6 +183,23 @@ TEST(DataCover, IsOfTheWholeGlobeWhereTheDataGoRoundIt) {
   EXPECT_EQ(south[1] + south[2] + south[3], 512);
 }
 
+TEST(DataCover, ReachesThePolesThatTheDataReach) {
+  const TemporaryFolder folder;
+  RasterFixture fixture;
+  fixture.width = 720;
+  fixture.height = 340;  // from the south pole up to 80 degrees
+  fixture.geotransform = {{-180, 0.5, 0, 80, 0, -0.5}};
+  fixture.void_value = -9999;
+  fixture.value = [](int c, int r) { return c > 200 && r > 200 && r < 300 ? -9999.0 : 50.0; };
+  const std::string path = file_in(folder, "dem.tif");
+  write_raster(path, fixture);
+  const std::optional<DataCover> cover = data_cover(survey_of(path, Projection::kGeodetic, -1));
+  ASSERT_TRUE(cover);
+  EXPECT_EQ(cover->posts_deg.south_deg, -90);
+  EXPECT_THAT(cover->rows.front(), ElementsAre(0, 512));
+  EXPECT_LT(cover->posts_deg.north_deg, 82);
+}
+
 TEST(DataCover, StandsInTheRecipeAsLinesOfNumbers) {
   const DataCover cover = {
       .posts_deg = {.west_deg = 5, .south_deg = 43, .east_deg = 6.5, .north_deg = 44},
