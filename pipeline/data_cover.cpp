@@ -121,11 +121,6 @@ std::optional<DataCover> data_cover(const Survey& survey) {
     if (cover && std::max(window->width_posts, window->height_posts) > kMostPosts) break;
     cover = cover_of(*survey.store, lattice, *window);
   }
-  if (!cover) return std::nullopt;
-  const std::vector<std::int32_t> full = {0, cover->columns};
-  const bool is_full = std::all_of(cover->rows.begin(), cover->rows.end(),
-                                   [&full](const auto& turns) { return turns == full; });
-  if (is_full) return std::nullopt;
   return cover;
 }
 

@@ -23,8 +23,8 @@ struct DataCover {
 };
 
 // The posts of the deepest zoom on which the data are at most 160 wide and high, or of zoom 0: a coarse
-// post has a height where a finer one near it has. Nothing where none of the smallest box is void. A pole
-// row has a height everywhere where the data reach the pole. Throws IoError when the lattice cannot be read.
+// post has a height where a finer one near it has. A pole row has a height everywhere where the data reach
+// the pole. Nothing where no post but poles has a height. Throws IoError when the lattice cannot be read.
 std::optional<DataCover> data_cover(const Survey& survey);
 
 // The JSON object of a recipe with the cover as its member "data":

@@ -16,6 +16,7 @@
 namespace qmpipe::testing {
 namespace {
 
+using ::testing::Each;
 using ::testing::ElementsAre;
 
 constexpr int kWidth = 260;
@@ -151,7 +152,7 @@ TEST(DataCover, TellsDataFromHolesAndCornersAnywhere) {
   }
 }
 
-TEST(DataCover, IsNothingWhereTheDataFillTheirBox) {
+TEST(DataCover, IsAFullBoxWhereTheDataFillIt) {
   const TemporaryFolder folder;
   RasterFixture fixture;
   fixture.width = 300;
@@ -159,7 +160,35 @@ TEST(DataCover, IsNothingWhereTheDataFillTheirBox) {
   fixture.geotransform = {{177, 0.02, 0, 10, 0, -0.02}};
   const std::string path = file_in(folder, "dem.tif");
   write_raster(path, fixture);
-  EXPECT_FALSE(data_cover(survey_of(path, Projection::kGeodetic, -1)));
+  const std::optional<DataCover> cover = data_cover(survey_of(path, Projection::kGeodetic, -1));
+  ASSERT_TRUE(cover);
+  EXPECT_THAT(cover->rows, Each(ElementsAre(0, cover->columns)));
+  EXPECT_NEAR(cover->posts_deg.west_deg, 177, 0.1);
+  EXPECT_NEAR(cover->posts_deg.east_deg, 183, 0.1);
+  EXPECT_NEAR(cover->posts_deg.south_deg, 6, 0.1);
+  EXPECT_NEAR(cover->posts_deg.north_deg, 10, 0.1);
+}
+
+// Its corners' bounds reach farther from the pole than any data.
+TEST(DataCover, IsNoWiderThanTheDataOfAPolarRaster) {
+  const TemporaryFolder folder;
+  RasterFixture fixture;
+  fixture.crs = "EPSG:3031";
+  fixture.width = 400;
+  fixture.height = 400;
+  fixture.geotransform = {{-2e6, 1e4, 0, 2e6, 0, -1e4}};
+  fixture.void_value = -9999;
+  fixture.value = [](int c, int r) {
+    return std::hypot(c - 199.5, r - 199.5) < 180 ? 50.0 : -9999.0;
+  };
+  const std::string path = file_in(folder, "dem.tif");
+  write_raster(path, fixture);
+  const Survey survey = survey_of(path, Projection::kGeodetic, -1);
+  const std::optional<DataCover> cover = data_cover(survey);
+  ASSERT_TRUE(cover);
+  EXPECT_GT(survey.sources.front().bounds_deg.north_deg, -65);
+  EXPECT_LT(cover->posts_deg.north_deg, -72);
+  EXPECT_GT(cover->posts_deg.north_deg, -74.5);
 }
 
 TEST(DataCover, IsOfTheWholeGlobeWhereTheDataGoRoundIt) {

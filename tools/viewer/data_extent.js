@@ -2,8 +2,8 @@
 
 const wholeTurn = 360;
 
-// Of a set by qmpipe whose box has holes and corners without data: posts in rows from the south and columns
-// from the west, 1 where the data have a height. Rows are evenly spaced in degrees here. Null: no void.
+// Where a set by qmpipe has data and where holes and corners are without: posts in rows from the south and columns
+// from the west, 1 where the data have a height. Rows are evenly spaced in degrees here. Null: it does not say.
 export function coverOf(layer) {
   const data = layer.qmpipe?.data;
   if (!isCover(data)) return null;
@@ -20,8 +20,8 @@ export function coverOf(layer) {
   const { posts_deg: postsDeg, columns } = data;
   if (layer.projection !== 'EPSG:3857' || rows.length < 2) return { postsDeg, columns, rows };
   const [south, north] = [mercator(postsDeg[1]), mercator(postsDeg[3])];
-  const even = Array.from({ length: 2 * rows.length }, (_, k) => {
-    const latitude = postsDeg[1] + (postsDeg[3] - postsDeg[1]) * k / (2 * rows.length - 1);
+  const even = rows.map((_, k) => {
+    const latitude = postsDeg[1] + (postsDeg[3] - postsDeg[1]) * k / (rows.length - 1);
     const row = (mercator(latitude) - south) / (north - south) * (rows.length - 1);
     return rows[Math.max(0, Math.min(Math.round(row), rows.length - 1))];
   });

@@ -164,7 +164,10 @@ const source = `
     float turn = czm_twoPi * coverPlace.z;
     if (turn > 0.0) at.x -= turn * floor((at.x - 0.5) / turn + 0.5);
     vec2 beyond = abs(at - 0.5);
-    float covered = step(max(beyond.x, beyond.y), 0.5) * step(0.5, texture(cover, clamp(at, 0.0, 1.0)).r);
+    // Data end less than a post's distance beyond the outermost posts.
+    vec2 last = 0.5 + 0.5 / vec2(textureSize(cover, 0));
+    float covered = step(beyond.x, last.x) * step(beyond.y, last.y) *
+        step(0.5, texture(cover, clamp(at, 0.0, 1.0)).r);
     colour = mix(colour, vec3(0.29, 0.3, 0.31), extent * (1.0 - within_x * within_y * covered));
     // Skirts and cliffs that are seen edge-on have pixels of kilometres.
     float largest = 10.0 * czm_metersPerPixel(vec4(-input_.positionToEyeEC, 1.0));
