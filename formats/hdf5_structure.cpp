@@ -7,6 +7,7 @@
 #include <cstring>
 #include <optional>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include "formats/file_bytes.h"
@@ -70,6 +71,10 @@ class Hdf5Structure::Parser {
     end_ = cursor.u64();
     cursor.skip(8 + 8);  // driver information; the root's name
     if (base != 0) return Error{"its addresses do not begin at its first byte"};
+    // All that is read is bounded by this, so it must not be what the file alone says.
+    std::error_code unknown;
+    const std::uintmax_t size = std::filesystem::file_size(path_, unknown);
+    if (unknown || end_ > size) return Error{"it is shorter than it says"};
     return cursor.u64();
   }
   std::uint64_t end() const { return end_; }

@@ -18,6 +18,7 @@
 #include "formats/file_seal.h"
 #include "formats/hash64.h"
 #include "formats/lattice_segment.h"
+#include "formats/little_endian.h"
 #include "formats/segment_files.h"
 #include "tests/lattice_blocks.h"
 #include "tests/random_borders.h"
@@ -246,6 +247,25 @@ TEST_P(Hdf5Hostile, RefusesNumbersOfAnotherTypeOrBehindFilters) {
 TEST_P(Hdf5Hostile, RefusesANamedPipe) {
   ASSERT_EQ(::mkfifo(path().c_str(), 0600), 0);
   EXPECT_THAT(GetParam().error_of_reading(path()), HasSubstr(path().string()));
+}
+
+// What may be read is bounded by the length of the file: it must be the real one.
+TEST_P(Hdf5Hostile, RefusesALengthThatTheFileDoesNotHave) {
+  GetParam().write(path());
+  const Bytes whole = bytes_of(path());
+  const auto body = without_seal(whole);
+  const std::uint32_t seed = 20261129;
+  std::mt19937_64 random(seed);
+  for (int k = 0; k < 60; ++k) {
+    Bytes longer(body.begin(), body.end());
+    constexpr std::size_t kEndOfFileAt = 40;
+    const std::uint64_t more = 4096 + (random() >> (1 + static_cast<unsigned>(k)));
+    store_little_endian(longer.data() + kEndOfFileAt, body.size() + more);
+    append_seal(longer, {});
+    write_file_atomically(path(), longer);
+    EXPECT_THAT(GetParam().error_of_reading(path()), HasSubstr("shorter than it says"))
+        << "seed " << seed << ", " << more << " more";
+  }
 }
 
 // Whatever is changed behind the seal: a model or an error, and never a crash. Few bytes are heights,
