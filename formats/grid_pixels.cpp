@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <unordered_map>
 
+#include "formats/void_height.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
 namespace {
-
-constexpr double kVoidPixel = std::numeric_limits<double>::quiet_NaN();
 
 // Empty, with a width or height that is not positive, where they do not meet.
 PixelWindow common_part(const PixelWindow& a, const PixelWindow& b) {
@@ -84,7 +82,7 @@ void GridPixels::read(SourcePool& pool, std::size_t grid, std::size_t last_raste
                       const PixelWindow& window, std::span<double> out, std::int64_t stride) {
   QMPIPE_CHECK(grid < pieces_.size() && window.width > 0 && window.height > 0);
   for (std::int64_t r = 0; r < window.height; ++r) {
-    std::fill_n(out.begin() + r * stride, window.width, kVoidPixel);
+    std::fill_n(out.begin() + r * stride, window.width, kVoidHeight);
   }
   for (const Piece& piece : pieces_[grid]) {
     if (piece.raster > last_raster) break;

@@ -8,11 +8,10 @@
 
 #include "formats/height_claim.h"
 #include "formats/height_unit.h"
+#include "formats/void_height.h"
 
 namespace qmpipe {
 namespace {
-
-constexpr double kVoidHeight = std::numeric_limits<double>::quiet_NaN();
 
 // The file's own values went through a float.
 double as_stored(double value, GDALDataType type) {

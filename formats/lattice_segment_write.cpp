@@ -9,8 +9,6 @@
 #include "scheduler/check.h"
 
 namespace qmpipe {
-namespace {}  // namespace
-
 std::uint64_t content_hash(const TileKey& key, std::span<const std::uint8_t> chunk) {
   return hash64(chunk, packed(key));
 }

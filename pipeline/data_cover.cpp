@@ -90,12 +90,10 @@ std::vector<std::int32_t> turns_of(std::span<const float> row_m) {
 
 DataCover cover_of(const LatticeStore& store, const Lattice& lattice, const PostWindow& window) {
   const std::vector<float> heights_m = heights_in(store, lattice, window);
-  const std::int64_t last = window.i0 + window.width_posts - 1;
-  const double turn_deg = last >= lattice.columns() ? 360 : 0;
   DataCover cover;
   cover.posts_deg = {.west_deg = lattice.longitude_deg(window.i0),
                      .south_deg = lattice.latitude_deg(window.j0),
-                     .east_deg = lattice.longitude_deg(lattice.wrap_column(last)) + turn_deg,
+                     .east_deg = lattice.longitude_deg(window.i0 + window.width_posts - 1),
                      .north_deg = lattice.latitude_deg(window.j0 + window.height_posts - 1)};
   cover.columns = window.width_posts;
   const auto width = static_cast<std::size_t>(window.width_posts);
@@ -112,16 +110,20 @@ DataCover cover_of(const LatticeStore& store, const Lattice& lattice, const Post
 }  // namespace
 
 std::optional<DataCover> data_cover(const Survey& survey) {
-  std::optional<DataCover> cover;
+  std::optional<Lattice> lattice;
+  PostWindow window;
   for (std::int32_t zoom = 0; zoom <= survey.max_zoom; ++zoom) {
     if (zoom > 0 && survey.tiles[static_cast<std::size_t>(zoom)].size() > kMostTiles) break;
-    const Lattice lattice(survey.scheme, zoom);
-    const std::optional<PostWindow> window = window_of_data(survey, lattice);
-    if (!window) continue;
-    if (cover && std::max(window->width_posts, window->height_posts) > kMostPosts) break;
-    cover = cover_of(*survey.store, lattice, *window);
+    const Lattice here(survey.scheme, zoom);
+    const std::optional<PostWindow> around_data = window_of_data(survey, here);
+    if (!around_data) continue;
+    if (lattice && std::max(around_data->width_posts, around_data->height_posts) > kMostPosts)
+      break;
+    lattice = here;
+    window = *around_data;
   }
-  return cover;
+  if (!lattice) return std::nullopt;
+  return cover_of(*survey.store, *lattice, window);
 }
 
 std::string with_cover(const std::string& recipe_json, const DataCover& cover) {

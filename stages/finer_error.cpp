@@ -6,12 +6,10 @@
 
 #include "scheduler/check.h"
 #include "stages/quantize.h"
+#include "stages/triangle_scan.h"
 
 namespace qmpipe {
 namespace {
-
-// Only covers the rounding of double arithmetic, as in tile_error.cpp.
-constexpr double kFinerMargin = 1e-6;
 
 // Where the posts of a window lie in the tile's quantized frame.
 struct WindowFrame {
@@ -61,12 +59,12 @@ Reach reach_at(const IntPoint (&corners)[3], double v) {
   for (int k = 0; k < 3; ++k) {
     const IntPoint& a = corners[k];
     const IntPoint& b = corners[(k + 1) % 3];
-    const double low = static_cast<double>(std::min(a.y, b.y)) - kFinerMargin;
-    const double high = static_cast<double>(std::max(a.y, b.y)) + kFinerMargin;
+    const double low = static_cast<double>(std::min(a.y, b.y)) - kRoundingMargin;
+    const double high = static_cast<double>(std::max(a.y, b.y)) + kRoundingMargin;
     if (v < low || v > high) continue;
     const auto take = [&reach](double u) {
-      reach.from = std::min(reach.from, u - kFinerMargin);
-      reach.to = std::max(reach.to, u + kFinerMargin);
+      reach.from = std::min(reach.from, u - kRoundingMargin);
+      reach.to = std::max(reach.to, u + kRoundingMargin);
     };
     if (a.y == b.y) {
       take(static_cast<double>(a.x));
@@ -110,8 +108,8 @@ ErrorSummary TileSurface::error(std::int32_t zoom, const PostWindow& window,
     const auto row_of = [&frame](double v) {
       return std::lower_bound(frame.v.begin(), frame.v.end(), v) - frame.v.begin();
     };
-    const auto first = row_of(static_cast<double>(std::min({a.y, b.y, c.y})) - kFinerMargin);
-    const auto end = row_of(static_cast<double>(std::max({a.y, b.y, c.y})) + kFinerMargin);
+    const auto first = row_of(static_cast<double>(std::min({a.y, b.y, c.y})) - kRoundingMargin);
+    const auto end = row_of(static_cast<double>(std::max({a.y, b.y, c.y})) + kRoundingMargin);
     for (auto j = first; j < end; ++j) {
       const double v = frame.v[static_cast<std::size_t>(j)];
       const Reach reach = reach_at(triangle.corners, v);

@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
+#include "formats/void_height.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
 namespace {
-
-constexpr float kVoidPost = std::numeric_limits<float>::quiet_NaN();
 
 // The 3 x 3 posts around a post of the finer zoom, from the south-west.
 struct Neighbourhood {
@@ -32,13 +30,13 @@ float mean_of(const Neighbourhood& posts) {
       weight += w;
     }
   }
-  return weight > 0 ? static_cast<float>(sum / weight) : kVoidPost;
+  return weight > 0 ? static_cast<float>(sum / weight) : kVoidHeight;
 }
 
 // NaN never compares as better, so voids drop out by themselves.
 template <class Better>
 float best_of(const Neighbourhood& posts, const Better& better) {
-  float best = kVoidPost;
+  float best = kVoidHeight;
   for (std::int32_t dj = -1; dj <= 1; ++dj) {
     for (std::int32_t di = -1; di <= 1; ++di) {
       const float height_m = posts.at(di, dj);
@@ -59,7 +57,7 @@ float reduced(const Neighbourhood& posts, Reduction reduction) {
     case Reduction::kMin:
       return best_of(posts, [](float a, float b) { return a < b; });
   }
-  return kVoidPost;
+  return kVoidHeight;
 }
 
 }  // namespace
@@ -78,7 +76,7 @@ void reduce_block(const LatticeStore& store, const TilingScheme& scheme, std::in
   for (std::int32_t j = 0; j < kBlockPosts; ++j) {
     float* row = out.data() + static_cast<std::ptrdiff_t>(j) * kBlockPosts;
     if (!coarse.has_row(first_post_of_block(by) + j)) {
-      std::fill(row, row + kBlockPosts, kVoidPost);
+      std::fill(row, row + kBlockPosts, kVoidHeight);
       continue;
     }
     const float* centre = heights_m.data() + (std::ptrdiff_t{2} * j + 1) * window.width_posts + 1;

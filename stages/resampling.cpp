@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
+#include "formats/void_height.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {
@@ -12,7 +12,6 @@ namespace {
 
 // A post on the very edge of the raster must not fall off it by rounding.
 constexpr double kEdgeSlackPixels = 1e-6;
-constexpr double kVoidValue = std::numeric_limits<double>::quiet_NaN();
 
 // Four neighbours: `first` is the upper left one; right and down are in [0, 1).
 struct Place {
@@ -29,7 +28,7 @@ struct Place {
 double middle_of(const RasterShape& shape) { return static_cast<double>(shape.width) / 2; }
 
 double bilinear_among_voids(const Place& p) {
-  if (std::isnan(p.containing_pixel())) return kVoidValue;
+  if (std::isnan(p.containing_pixel())) return kVoidHeight;
   const std::array<double, 4> heights = {p.first[0], p.first[1], p.first[p.stride],
                                          p.first[p.stride + 1]};
   const std::array<double, 4> weights = {(1 - p.right) * (1 - p.down), p.right * (1 - p.down),

@@ -9,13 +9,13 @@
 #include <utility>
 
 #include "formats/grid_pixels.h"
+#include "formats/void_height.h"
 #include "scheduler/check.h"
 #include "stages/post_positions.h"
 
 namespace qmpipe {
 namespace {
 
-constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 // Bounds of what one read may ask for, and of the positions held at a time; results do not depend
 // on either.
 constexpr std::int64_t kLargestReadPixels = 4'000'000;
@@ -159,7 +159,7 @@ void Sampler::Impl::leave_out_later(const PixelRun& run, const Strip& block, con
   std::vector<float> nearest(part.width);
   for (std::size_t r = 0; r < part.height; ++r) {
     const std::span<PixelPoint> row = places_of(block, part, r);
-    std::fill(nearest.begin(), nearest.end(), kVoid);
+    std::fill(nearest.begin(), nearest.end(), kVoidHeight);
     resample(Resampling::kNearest, shape, {.needed = needed, .heights_m = pixels}, row, nearest);
     for (std::size_t k = 0; k < row.size(); ++k) {
       if (std::isnan(nearest[k])) row[k].column = std::numeric_limits<double>::quiet_NaN();
@@ -274,7 +274,7 @@ float Sampler::Impl::pole_height_m(const Lattice& lattice, std::int64_t j) {
   double sum = 0;
   int count = 0;
   for (std::int32_t k = 0; k < kPolePosts; ++k) {
-    std::array<float, 1> height = {kVoid};
+    std::array<float, 1> height = {kVoidHeight};
     const PostWindow post{
         .i0 = k * (lattice.columns() / kPolePosts), .j0 = j, .width_posts = 1, .height_posts = 1};
     sample_strip(lattice, {.posts = post, .out = height, .stride = 1});
@@ -282,7 +282,7 @@ float Sampler::Impl::pole_height_m(const Lattice& lattice, std::int64_t j) {
     sum += static_cast<double>(height[0]);
     ++count;
   }
-  const float mean = count == 0 ? kVoid : static_cast<float>(sum / count);
+  const float mean = count == 0 ? kVoidHeight : static_cast<float>(sum / count);
   pole_heights_m.emplace(key, mean);
   return mean;
 }
@@ -297,7 +297,7 @@ Sampler::Sampler(Sampler&&) noexcept = default;
 
 void Sampler::sample(const Lattice& lattice, const PostWindow& window, std::span<float> out) {
   QMPIPE_CHECK(out.size() == window.size());
-  std::fill(out.begin(), out.end(), kVoid);
+  std::fill(out.begin(), out.end(), kVoidHeight);
   const std::int64_t j0 = std::max<std::int64_t>(window.j0, 0);
   const std::int64_t j1 = std::min(window.j0 + window.height_posts, lattice.rows());
   if (j0 >= j1) return;

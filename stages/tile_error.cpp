@@ -11,10 +11,6 @@
 namespace qmpipe {
 namespace {
 
-// Only covers the rounding of double arithmetic: each post belongs to one triangle, or to two that
-// agree on it.
-constexpr double kMargin = 1e-6;
-
 // What both kinds of mesh come down to.
 struct Surface {
   std::vector<IntPoint> places;
@@ -58,8 +54,8 @@ std::vector<double> heights_at_posts(const PostGrid& grid, const Surface& surfac
     const Plane plane =
         plane_through(a, b, c, surface.heights_m[vertices[0]], surface.heights_m[vertices[1]],
                       surface.heights_m[vertices[2]]);
-    const PostRows rows = rows_of_triangle(grid, a, b, c, kMargin);
-    scan_triangle(grid, a, b, c, kMargin, rows.first, rows.last,
+    const PostRows rows = rows_of_triangle(grid, a, b, c, kRoundingMargin);
+    scan_triangle(grid, a, b, c, kRoundingMargin, rows.first, rows.last,
                   [&](std::int32_t j, std::int32_t i_first, std::int32_t i_last) {
                     const double v = grid.v_exact[static_cast<std::size_t>(j)];
                     for (std::int32_t i = i_first; i <= i_last; ++i) {

@@ -16,6 +16,9 @@
 
 namespace qmpipe {
 
+// A tiny margin: it only covers the rounding of double arithmetic.
+inline constexpr double kRoundingMargin = 1e-6;
+
 // value = at_origin + du * u + dv * v over the quantized frame.
 struct Plane {
   double at_origin = 0;

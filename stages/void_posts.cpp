@@ -11,9 +11,6 @@
 namespace qmpipe {
 namespace {
 
-// One post belongs to each triangle that it lies on the outline of.
-constexpr double kOutlineMargin = 1e-6;
-
 // A grid of means, a void where nothing below is valid; NaN marks it.
 struct Means {
   std::int32_t width = 0;
@@ -76,8 +73,8 @@ std::int32_t nearest_post(const PostGrid& grid, double u, double v) {
 bool is_mostly_void(const PostGrid& grid, const IntPoint& a, const IntPoint& b, const IntPoint& c,
                     std::span<const std::uint8_t> valid) {
   PostCount count;
-  const PostRows rows = rows_of_triangle(grid, a, b, c, kOutlineMargin);
-  scan_triangle(grid, a, b, c, kOutlineMargin, rows.first, rows.last,
+  const PostRows rows = rows_of_triangle(grid, a, b, c, kRoundingMargin);
+  scan_triangle(grid, a, b, c, kRoundingMargin, rows.first, rows.last,
                 [&](std::int32_t j, std::int32_t i_first, std::int32_t i_last) {
                   for (std::int32_t i = i_first; i <= i_last; ++i) {
                     ++count.all;

@@ -22,11 +22,12 @@ using ::testing::ElementsAre;
 constexpr int kWidth = 260;
 constexpr int kHeight = 200;
 
-Survey survey_of(const std::string& path, Projection projection, std::int32_t max_zoom) {
+Survey survey_of(const RasterFixture& fixture, Projection projection = Projection::kGeodetic) {
+  const TemporaryFolder folder;
   SurveyOptions options;
-  options.inputs = {path};
+  options.inputs = {file_in(folder, "dem.tif")};
+  write_raster(options.inputs.front(), fixture);
   options.scheme = TilingScheme(projection);
-  options.max_zoom = max_zoom;
   Progress progress(ProgressStyle::kSilent, nullptr);
   return run_survey(options, describe_inputs(options), progress);
 }
@@ -130,7 +131,6 @@ TEST(DataCover, TellsDataFromHolesAndCornersAnywhere) {
   const auto draw = [&random](double from, double to) {
     return std::uniform_real_distribution<double>(from, to)(random);
   };
-  const TemporaryFolder folder;
   for (int round = 0; round < 12; ++round) {
     SCOPED_TRACE(::testing::Message() << "seed " << seed << ", round " << round);
     Ground ground;
@@ -143,24 +143,18 @@ TEST(DataCover, TellsDataFromHolesAndCornersAnywhere) {
     ground.hole_row = draw(60, 140);
     ground.hole_radius = draw(25, 50);
     const Projection projection = round % 2 == 0 ? Projection::kGeodetic : Projection::kMercator;
-    const std::string path = file_in(folder, "dem.tif");
-    write_raster(path, ground.raster());
-    const Survey survey = survey_of(path, projection, -1);
-    const std::optional<DataCover> cover = data_cover(survey);
+    const std::optional<DataCover> cover = data_cover(survey_of(ground.raster(), projection));
     ASSERT_TRUE(cover);
     expect_cover(ground, projection, *cover);
   }
 }
 
 TEST(DataCover, IsAFullBoxWhereTheDataFillIt) {
-  const TemporaryFolder folder;
   RasterFixture fixture;
   fixture.width = 300;
   fixture.height = 200;
   fixture.geotransform = {{177, 0.02, 0, 10, 0, -0.02}};
-  const std::string path = file_in(folder, "dem.tif");
-  write_raster(path, fixture);
-  const std::optional<DataCover> cover = data_cover(survey_of(path, Projection::kGeodetic, -1));
+  const std::optional<DataCover> cover = data_cover(survey_of(fixture));
   ASSERT_TRUE(cover);
   EXPECT_THAT(cover->rows, Each(ElementsAre(0, cover->columns)));
   EXPECT_NEAR(cover->posts_deg.west_deg, 177, 0.1);
@@ -171,7 +165,6 @@ TEST(DataCover, IsAFullBoxWhereTheDataFillIt) {
 
 // Its corners' bounds reach farther from the pole than any data.
 TEST(DataCover, IsNoWiderThanTheDataOfAPolarRaster) {
-  const TemporaryFolder folder;
   RasterFixture fixture;
   fixture.crs = "EPSG:3031";
   fixture.width = 400;
@@ -181,9 +174,7 @@ TEST(DataCover, IsNoWiderThanTheDataOfAPolarRaster) {
   fixture.value = [](int c, int r) {
     return std::hypot(c - 199.5, r - 199.5) < 180 ? 50.0 : -9999.0;
   };
-  const std::string path = file_in(folder, "dem.tif");
-  write_raster(path, fixture);
-  const Survey survey = survey_of(path, Projection::kGeodetic, -1);
+  const Survey survey = survey_of(fixture);
   const std::optional<DataCover> cover = data_cover(survey);
   ASSERT_TRUE(cover);
   EXPECT_GT(survey.sources.front().bounds_deg.north_deg, -65);
@@ -192,16 +183,13 @@ TEST(DataCover, IsNoWiderThanTheDataOfAPolarRaster) {
 }
 
 TEST(DataCover, IsOfTheWholeGlobeWhereTheDataGoRoundIt) {
-  const TemporaryFolder folder;
   RasterFixture fixture;
   fixture.width = 720;
   fixture.height = 300;
   fixture.geotransform = {{-180, 0.5, 0, 75, 0, -0.5}};
   fixture.void_value = -9999;
   fixture.value = [](int c, int r) { return c > 200 && c < 300 && r > 100 ? -9999.0 : 50.0; };
-  const std::string path = file_in(folder, "dem.tif");
-  write_raster(path, fixture);
-  const std::optional<DataCover> cover = data_cover(survey_of(path, Projection::kGeodetic, -1));
+  const std::optional<DataCover> cover = data_cover(survey_of(fixture));
   ASSERT_TRUE(cover);
   EXPECT_EQ(cover->columns, 512);
   EXPECT_EQ(cover->posts_deg.west_deg, -180);
@@ -213,16 +201,13 @@ TEST(DataCover, IsOfTheWholeGlobeWhereTheDataGoRoundIt) {
 }
 
 TEST(DataCover, ReachesThePolesThatTheDataReach) {
-  const TemporaryFolder folder;
   RasterFixture fixture;
   fixture.width = 720;
   fixture.height = 340;  // from the south pole up to 80 degrees
   fixture.geotransform = {{-180, 0.5, 0, 80, 0, -0.5}};
   fixture.void_value = -9999;
   fixture.value = [](int c, int r) { return c > 200 && r > 200 && r < 300 ? -9999.0 : 50.0; };
-  const std::string path = file_in(folder, "dem.tif");
-  write_raster(path, fixture);
-  const std::optional<DataCover> cover = data_cover(survey_of(path, Projection::kGeodetic, -1));
+  const std::optional<DataCover> cover = data_cover(survey_of(fixture));
   ASSERT_TRUE(cover);
   EXPECT_EQ(cover->posts_deg.south_deg, -90);
   EXPECT_THAT(cover->rows.front(), ElementsAre(0, 512));

@@ -307,9 +307,7 @@ TEST(FileSeal, RefusesPartsThatOverlapOrAreOutOfOrder) {
     file.resize(1000);
     // As append_seal() would, of other parts.
     std::uint64_t hash = 0x716D706970650001ULL;
-    const auto append = [&file](std::uint64_t value) {
-      for (int k = 0; k < 8; ++k) file.push_back(static_cast<std::uint8_t>(value >> (8 * k)));
-    };
+    const auto append = [&file](std::uint64_t value) { append_little_endian(file, value); };
     for (const ByteRange& part : parts) {
       hash = hash64(std::span(file).subspan(part.offset, part.bytes), hash);
     }
