@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "formats/crs_paths.h"
 #include "formats/gdal_session.h"
 #include "formats/letter_case.h"
 
@@ -14,13 +15,15 @@ namespace {
 
 constexpr std::size_t kLongestText = 65536;
 
-// PROJ's ways to other files: grids of a datum shift, tables of definitions, files of parameters.
+// PROJ's ways to other files: grids of a datum shift (of PROJ strings, or PROJ4_GRIDS of WKT), tables
+// of definitions, files of parameters, meshes and models.
 bool names_files(const std::string& text) {
-  static constexpr std::array<const char*, 5> kWays = {
-      "grids=", "init=", "file=", "catalog=", "parameterfile"};
+  static constexpr std::array<const char*, 7> kWays = {
+      "grids=", "proj4_grids", "init=", "file=", "catalog=", "parameterfile", "model="};
   const std::string words = lower_case(text);
-  return std::any_of(kWays.begin(), kWays.end(),
-                     [&words](const char* way) { return words.find(way) != std::string::npos; });
+  return path_in_crs(text) || std::any_of(kWays.begin(), kWays.end(), [&words](const char* way) {
+           return words.find(way) != std::string::npos;
+         });
 }
 
 }  // namespace

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "formats/crs_beside.h"
+#include "formats/crs_paths.h"
 #include "formats/errors.h"
 #include "formats/gdal_session.h"
 #include "formats/height_unit.h"
@@ -148,6 +150,9 @@ RasterCrs crs_of_points(const std::string& path, const LasCrs& crs,
   }
   const Dataset dataset(driver->Create("", 1, 1, 1, GDT_Byte, nullptr));
   if (override_text.empty()) {
+    for (const std::string& text : {crs.wkt, crs.geo_text}) {
+      if (const auto named = path_in_crs(text)) refuse_path_in_crs(path, *named);
+    }
     std::string wkt = crs.wkt;
     // A first row of four numbers, and four for each key.
     if (wkt.empty() && crs.geo_keys.size() >= 8) wkt = crs_in_keys(path, crs, session);

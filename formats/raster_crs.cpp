@@ -11,6 +11,8 @@
 #include <numbers>
 #include <optional>
 
+#include "formats/crs_beside.h"
+#include "formats/crs_paths.h"
 #include "formats/errors.h"
 #include "formats/raster_dataset.h"
 
@@ -106,12 +108,24 @@ OGRSpatialReference crs_from_text(const std::string& text) {
 
 OGRSpatialReference crs_from_prj(const fs::path& prj) {
   CPLStringList lines(CSLLoad(prj.c_str()));
+  std::string text;
+  for (int k = 0; k < lines.Count(); ++k) text += std::string(lines[k]) + "\n";
+  if (const auto named = path_in_crs(text)) refuse_path_in_crs(prj.string(), *named);
   OGRSpatialReference crs;
   if (lines.Count() == 0 || crs.importFromESRI(lines.List()) != OGRERR_NONE) {
     throw IoError("cannot use the CRS in", prj.string(), "it is no CRS that GDAL understands",
                   kNoCrsRemedy);
   }
   return crs;
+}
+
+std::string wkt_of(const OGRSpatialReference& crs) {
+  char* text = nullptr;
+  const std::array<const char*, 2> options = {"FORMAT=WKT2_2019", nullptr};
+  crs.exportToWkt(&text, options.data());
+  std::string wkt = text != nullptr ? text : "";
+  CPLFree(text);
+  return wkt;
 }
 
 // Empty where there is none and none is required.
@@ -123,6 +137,7 @@ OGRSpatialReference find_crs(GDALDataset& dataset, const std::string& path,
     crs = crs_from_text(override_text);
   } else if (const OGRSpatialReference* own = dataset.GetSpatialRef();
              own != nullptr && !own->IsEmpty()) {
+    if (const auto named = path_in_crs(wkt_of(*own))) refuse_path_in_crs(path, *named);
     if (const auto fault = fault_of_crs(*own)) {
       throw IoError("cannot place the raster", path, "its CRS " + *fault, kNoCrsRemedy);
     }
@@ -151,15 +166,6 @@ std::array<int, 2> axes_of(const OGRSpatialReference& crs) {
   if (mapping.size() >= 2) axes = {mapping[0], mapping[1]};
   const bool is_plane = std::abs(axes[0]) + std::abs(axes[1]) == 3;
   return is_plane ? axes : std::array<int, 2>{1, 2};
-}
-
-std::string wkt_of(const OGRSpatialReference& crs) {
-  char* text = nullptr;
-  const std::array<const char*, 2> options = {"FORMAT=WKT2_2019", nullptr};
-  crs.exportToWkt(&text, options.data());
-  std::string wkt = text != nullptr ? text : "";
-  CPLFree(text);
-  return wkt;
 }
 
 }  // namespace

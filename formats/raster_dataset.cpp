@@ -11,6 +11,7 @@
 #include <optional>
 #include <utility>
 
+#include "formats/crs_beside.h"
 #include "formats/errors.h"
 #include "formats/gdal_session.h"
 #include "formats/height_claim.h"
@@ -58,6 +59,22 @@ void require_no_stream(const std::string& path) {
                 "Write it to a file first: cat PIPE > dem.tif");
 }
 
+// That a name such as NETCDF:"a.nc":z or GTIFF_DIR:2:a.tif is about.
+std::string file_of_name(const std::string& name) {
+  const std::size_t first = name.find('"');
+  const std::size_t last = name.rfind('"');
+  if (first != last) return name.substr(first + 1, last - first - 1);
+  if (name.starts_with("/vsi")) return name;
+  VSIStatBufL status;
+  std::string rest = name;
+  while (VSIStatL(rest.c_str(), &status) != 0) {
+    const std::size_t colon = rest.find(':');
+    if (colon == std::string::npos) return name;
+    rest.erase(0, colon + 1);
+  }
+  return rest;
+}
+
 OpenedRaster open_in_archive(const std::string& path,
                              const std::vector<std::string>& open_options) {
   GdalSession session;
@@ -81,6 +98,7 @@ OpenedRaster open_in_archive(const std::string& path,
                   "name the one that is meant: " +
                       (rasters.empty() ? root + "/NAME" : fmt::format("{}", rasters.front())));
   }
+  require_no_path_in_crs(rasters.front());
   Dataset dataset = try_open(rasters.front(), open_options);
   if (!dataset) {
     throw IoError("cannot open the raster", rasters.front(), session.cause("GDAL refused it"),
@@ -245,6 +263,20 @@ OpenedRaster open_dataset(const std::string& path, const std::vector<std::string
   if (is_netcdf(*opened.dataset) && !has_geotransform(*opened.dataset) &&
       opened.dataset->GetGCPCount() == 0) {
     place_by_axes(opened);
+  }
+  return opened;
+}
+
+OpenedRaster open_new_dataset(const std::string& path,
+                              const std::vector<std::string>& open_options) {
+  require_no_stream(path);
+  const std::string file = file_of_name(path);
+  require_no_path_in_crs(file);
+  OpenedRaster opened = open_dataset(path, open_options);
+  if (opened.driver != "VRT") return opened;
+  // Not yet open: that they are when they are read.
+  for (const std::string& part : files_of(opened)) {
+    if (part != file) require_no_path_in_crs(part);
   }
   return opened;
 }

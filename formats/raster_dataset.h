@@ -34,4 +34,9 @@ std::vector<std::string> files_of(const OpenedRaster& opened);
 // this thread.
 OpenedRaster open_dataset(const std::string& path, const std::vector<std::string>& open_options);
 
+// The same of a raster that nobody looked at before: throws IoError too where a CRS in it, in the
+// files beside it or in those that a mosaic (VRT) reads names a path (formats/crs_beside.h).
+OpenedRaster open_new_dataset(const std::string& path,
+                              const std::vector<std::string>& open_options);
+
 }  // namespace qmpipe

@@ -29,7 +29,7 @@ using FilesByPath = std::map<std::string, RasterFile>;
 
 void collect(const std::string& path, const std::vector<std::string>& open_options,
              FilesByPath& files) {
-  const OpenedRaster opened = open_dataset(path, open_options);
+  const OpenedRaster opened = open_new_dataset(path, open_options);
   const std::vector<std::string> names = files_of(opened);
   if (names.empty()) {
     if (const auto file = describe_file(path)) files.emplace(path, *file);

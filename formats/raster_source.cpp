@@ -148,8 +148,9 @@ RasterSource::~RasterSource() = default;
 const RasterInfo& RasterSource::info() const { return impl_->info; }
 
 void RasterSource::Impl::open(const std::string& path, const OpenOptions& options) {
-  opened = open_dataset(options.opened_name.empty() ? path : options.opened_name,
-                        options.heights.open_options);
+  const std::vector<std::string>& open_options = options.heights.open_options;
+  opened = options.opened_name.empty() ? open_new_dataset(path, open_options)
+                                       : open_dataset(options.opened_name, open_options);
   height_options = options.heights;
   describe(path);
   // What was placed on the globe is.

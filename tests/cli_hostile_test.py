@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import zipfile
 
 QMPIPE = None
 COMMANDS = (["build"], ["verify"], ["serve"], ["check"], ["compare"], ["convert"], ["pack"],
@@ -342,12 +343,82 @@ class CliHostile(unittest.TestCase):
         readable = self.place / "a.prj"
         readable.write_text("EPSG:4326")
         for text in (str(pipe), f"ESRI::{pipe}", f"+init={pipe}:1", f"+proj=longlat +nadgrids={pipe}",
-                     str(readable), f"+proj=longlat +geoidgrids=@null,{pipe}"):
+                     str(readable), f"+proj=longlat +geoidgrids=@null,{pipe}",
+                     *self.crs_that_names(pipe)):
             with self.subTest(text):
                 done = run("verify", self.set_with_crs(text), "--source", self.dem, timeout=30)
                 told = done.stdout.decode() + done.said
                 self.assertEqual(done.returncode, 3, told)
                 self.assertRegex(told, r"layer\.json.*source_crs")
+
+    @staticmethod
+    def crs_that_names(path):
+        """Texts for which GDAL or PROJ opens the path, most of them while they parse."""
+        def utm(datum="", end="", method="Transverse_Mercator"):
+            return (f'PROJCS["a",GEOGCS["b",DATUM["c",SPHEROID["WGS 84",6378137,298.257223563]{datum}],'
+                    'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],'
+                    f'PROJECTION["{method}"],PARAMETER["central_meridian",9],'
+                    f'PARAMETER["scale_factor",0.9996],UNIT["metre",1]{end}]')
+        yield utm(datum=f',EXTENSION["PROJ4_GRIDS","{path}"]')
+        yield utm(end=f',EXTENSION["PROJ4","+proj=tmerc +lon_0=9 +nadgrids={path} +wktext"]')
+        yield utm(end=f',EXTENSION["PROJ4","+proj=tmerc +init={path}:1"]')
+        yield utm(method=f"PROJ defmodel model={path}")
+
+    def test_a_rasters_crs_opens_no_file(self):
+        pipe = self.place / "grid.gsb"
+        os.mkfifo(pipe)
+        heights = "\n".join(" ".join(str(100 + (i * j) % 7) for i in range(20)) for j in range(20))
+        escape = lambda text: text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
+        geometry = "<GeoTransform>500000,30,0,5000000,0,-30</GeoTransform>"
+        for number, crs in enumerate((*self.crs_that_names(pipe), f"+proj=longlat +nadgrids={pipe}",
+                                      f"+init={pipe}:1")):
+            asc = self.place / f"prj{number}" / "a.asc"
+            asc.parent.mkdir()
+            asc.write_text("ncols 20\nnrows 20\nxllcorner 500000\nyllcorner 5000000\ncellsize 30\n"
+                           + heights)
+            asc.with_suffix(".prj").write_text(crs)
+            pam = self.place / f"pam{number}" / "b.asc"
+            pam.parent.mkdir()
+            pam.write_text(asc.read_text())
+            (pam.parent / "b.asc.aux.xml").write_text(
+                f"<PAMDataset><SRS>{escape(crs)}</SRS></PAMDataset>")
+            vrt = self.place / f"c{number}.vrt"
+            vrt.write_text(f'<VRTDataset rasterXSize="20" rasterYSize="20"><SRS>{escape(crs)}</SRS>'
+                           f'{geometry}<VRTRasterBand dataType="Float32" band="1"/></VRTDataset>')
+            mosaic = self.place / f"d{number}.vrt"
+            mosaic.write_text(
+                '<VRTDataset rasterXSize="20" rasterYSize="20"><SRS>EPSG:32632</SRS>'
+                f'{geometry}<VRTRasterBand dataType="Float32" band="1"><SimpleSource>'
+                f'<SourceFilename>{pam}</SourceFilename><SourceBand>1</SourceBand>'
+                "</SimpleSource></VRTRasterBand></VRTDataset>")
+            archive = self.place / f"e{number}.zip"
+            with zipfile.ZipFile(archive, "w") as into:
+                into.write(asc, "a.asc")
+                into.write(asc.with_suffix(".prj"), "a.prj")
+            for raster in (asc, pam, vrt, mosaic, archive):
+                for line in (["build", raster, "-o", self.place / "out"],
+                             ["tin", raster, "-o", self.place / "a.ply", "--triangles", 9]):
+                    with self.subTest(crs=crs, line=line):
+                        self.refused(run(*line, timeout=30), 1, str(pipe), "--source-crs")
+
+    def test_a_pipe_beside_a_raster_is_not_waited_for(self):
+        for ending in (".aux.xml", ".ovr", ".msk"):
+            raster = self.place / ending[1:] / "dem.tif"
+            raster.parent.mkdir()
+            shutil.copy(self.dem, raster)
+            os.mkfifo(str(raster) + ending)
+            with self.subTest(ending):
+                self.refused(run("build", raster, "-o", self.place / "out", timeout=30), 1, ending,
+                             "pipe")
+
+    def test_a_rasters_grid_in_projs_folders_is_used(self):
+        """A bare name is no path; the grid in it is read, here none that is one."""
+        raster = self.place / "dem.tif"
+        shutil.copy(self.dem, raster)
+        (self.place / "dem.tif.aux.xml").write_text(
+            "<PAMDataset><SRS>+proj=longlat +datum=WGS84 +nadgrids=@null +no_defs</SRS></PAMDataset>")
+        done = run("build", raster, "-o", self.place / "out")
+        self.assertEqual(done.returncode, 0, done.said)
 
     def test_a_sets_own_crs_is_still_used(self):
         for text in ("EPSG:4326", "OGC:CRS84", "+proj=longlat +datum=WGS84 +no_defs"):

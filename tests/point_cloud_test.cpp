@@ -17,6 +17,7 @@
 namespace qmpipe {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::las_bytes;
@@ -139,6 +140,17 @@ TEST(PointCloud, TheUsersCrsGoesBeforeTheFiles) {
   EXPECT_THAT(refusal_of([&] { read_las(fixture); }), HasSubstr("--source-crs"));
   EXPECT_EQ(read_las(fixture, {.source_crs = "EPSG:32611"}).crs_name, "WGS 84 / UTM zone 11N");
   EXPECT_THROW(read_las(fixture, {.source_crs = "nonsense"}), UsageError);
+}
+
+TEST(PointCloud, ItsCrsOpensNoFile) {
+  LasFixture fixture = corners();
+  fixture.wkt =
+      "GEOGCS[\"a\",DATUM[\"b\",SPHEROID[\"c\",6378137,298.257223563],"
+      "EXTENSION[\"PROJ4_GRIDS\",\"/dev/zero\"]],PRIMEM[\"Greenwich\",0],"
+      "UNIT[\"degree\",0.0174532925199433]]";
+  EXPECT_THAT(refusal_of([&] { read_las(fixture); }),
+              AllOf(HasSubstr("'/dev/zero'"), HasSubstr("--source-crs")));
+  EXPECT_EQ(read_las(fixture, {.source_crs = "EPSG:32611"}).crs_name, "WGS 84 / UTM zone 11N");
 }
 
 TEST(PointCloud, DegreesBecomeMetresAtTheMiddleLatitude) {
