@@ -108,6 +108,7 @@ Found path_behind(std::string_view text, std::string_view lower, std::string_vie
 // WKT may have the quotation marks of print.
 std::string with_plain_quotes(std::string_view text) {
   constexpr std::size_t kBytes = 3;
+  if (text.find("\u201c") == npos && text.find("\u201d") == npos) return std::string(text);
   std::string plain;
   while (!text.empty()) {
     const std::string_view next = text.substr(0, kBytes);

@@ -269,7 +269,6 @@ OpenedRaster open_dataset(const std::string& path, const std::vector<std::string
 
 OpenedRaster open_new_dataset(const std::string& path,
                               const std::vector<std::string>& open_options) {
-  require_no_stream(path);
   const std::string file = file_of_name(path);
   require_no_path_in_crs(file);
   OpenedRaster opened = open_dataset(path, open_options);
