@@ -17,7 +17,7 @@ namespace qmpipe {
 namespace {
 
 // Statistics and attribute tables make the longest of them.
-constexpr vsi_l_offset kLongestText = 4 << 20;
+constexpr vsi_l_offset kLongestSidecar = 4 << 20;
 constexpr vsi_l_offset kPart = 64 << 10;
 
 using VsiFile = std::unique_ptr<VSILFILE, FreeWith<VSIFCloseL>>;
@@ -90,7 +90,7 @@ void require_no_path_in_crs(const std::string& raster) {
   for (const auto& [path, is_text] : sidecars_of(raster)) {
     if (path == raster || VSIStatL(path.c_str(), &status) != 0) continue;
     if (S_ISREG(status.st_mode)) {
-      require_no_path_in(path, bytes(), is_text ? kLongestText : 2 * kPart);
+      require_no_path_in(path, bytes(), is_text ? kLongestSidecar : 2 * kPart);
     } else if (!S_ISDIR(status.st_mode)) {
       throw IoError("cannot open the raster", raster,
                     "GDAL would read " + path + " with it, which is a pipe or a device",
