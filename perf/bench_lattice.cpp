@@ -7,7 +7,7 @@
 #include <ctime>
 #include <future>
 
-#include "formats/hdf5_lattice_store.h"
+#include "formats/run_store/hdf5_lattice_store.h"
 #include "perf/cold_files.h"
 #include "scheduler/check.h"
 #include "tests/lattice_blocks.h"

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/lattice_store.h"
+#include "formats/run_store/lattice_store.h"
 #include "perf/bench_terrain.h"
 
 namespace benchmark {

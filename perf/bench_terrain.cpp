@@ -6,11 +6,11 @@
 #include <cstdlib>
 #include <stdexcept>
 
-#include "formats/crs_transform.h"
+#include "formats/crs/transform.h"
 #include "scheduler/check.h"
 #include "scheduler/wavefront.h"
-#include "stages/height_step.h"
-#include "stages/synth_terrain.h"
+#include "stages/posts/height_step.h"
+#include "stages/synth/synth_terrain.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::perf {

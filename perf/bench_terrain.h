@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "scheduler/tile_key.h"
-#include "stages/greedy.h"
-#include "stages/heightfield.h"
-#include "stages/sampling.h"
+#include "stages/greedy/greedy.h"
+#include "stages/posts/heightfield.h"
+#include "stages/posts/sampling.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe::perf {

@@ -6,12 +6,12 @@
 #include <filesystem>
 #include <vector>
 
-#include "formats/detail_file.h"
+#include "formats/detail_model/file.h"
 #include "perf/bench_terrain.h"
 #include "perf/register_benchmarks.h"
-#include "stages/detail_block.h"
-#include "stages/detail_increment.h"
-#include "stages/synth_terrain.h"
+#include "stages/detail_model/block.h"
+#include "stages/detail_model/increment.h"
+#include "stages/synth/synth_terrain.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe::perf {

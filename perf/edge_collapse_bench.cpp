@@ -20,8 +20,8 @@
 
 #include "perf/bench_terrain.h"
 #include "perf/register_benchmarks.h"
-#include "stages/base_tin.h"
-#include "stages/edge_collapse.h"
+#include "stages/edge_collapse/edge_collapse.h"
+#include "stages/surface/base_tin.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe::perf {

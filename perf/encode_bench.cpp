@@ -7,12 +7,12 @@
 #include <memory>
 #include <string>
 
-#include "formats/gzip.h"
+#include "formats/bytes/gzip.h"
 #include "perf/bench_terrain.h"
 #include "perf/register_benchmarks.h"
-#include "stages/mesh_order.h"
-#include "stages/normals.h"
-#include "stages/quantize.h"
+#include "stages/finish/mesh_order.h"
+#include "stages/finish/normals.h"
+#include "stages/finish/quantize.h"
 
 namespace qmpipe::perf {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "perf/bench_terrain.h"
 #include "perf/register_benchmarks.h"
-#include "stages/point_set.h"
+#include "stages/point_sets/point_set.h"
 
 namespace qmpipe::perf {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/lattice_store.h"
+#include "formats/run_store/lattice_store.h"
 #include "perf/bench_terrain.h"
 #include "perf/register_benchmarks.h"
 #include "tests/raster_fixture.h"

@@ -12,8 +12,8 @@
 #include <random>
 #include <thread>
 
-#include "formats/tile_output.h"
-#include "formats/tile_set.h"
+#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/tile_output.h"
 #include "perf/bench_terrain.h"
 #include "perf/register_benchmarks.h"
 

@@ -3,7 +3,7 @@
 // `read_warm` reads a store that has every block in its cache; `read_cold` starts with empty caches.
 #include <benchmark/benchmark.h>
 
-#include "formats/border_store.h"
+#include "formats/run_store/border_store.h"
 #include "perf/bench_lattice.h"
 #include "perf/register_benchmarks.h"
 

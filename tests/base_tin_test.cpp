@@ -1,4 +1,4 @@
-#include "stages/base_tin.h"
+#include "stages/surface/base_tin.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "pipeline/block_cover.h"
+#include "pipeline/survey/block_cover.h"
 
 #include <gtest/gtest.h>
 

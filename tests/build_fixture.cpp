@@ -4,8 +4,8 @@
 #include <numbers>
 #include <random>
 
-#include "formats/tile_set.h"
-#include "pipeline/verify.h"
+#include "formats/tile/tile_set.h"
+#include "pipeline/verify/verify.h"
 
 namespace qmpipe::testing {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/build.h"
+#include "pipeline/build/build.h"
 #include "tests/raster_fixture.h"
 #include "tests/temporary_folder.h"
 

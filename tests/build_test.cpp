@@ -1,6 +1,6 @@
 // The whole build on small rasters: the same bytes whatever the threads and the memory, nothing
 // wrong by `verify`, and a clear end when it cannot go on.
-#include "pipeline/build.h"
+#include "pipeline/build/build.h"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include <numbers>
 #include <random>
 
-#include "formats/errors.h"
-#include "formats/tile_set.h"
-#include "pipeline/memory_share.h"
-#include "pipeline/verify.h"
+#include "formats/bytes/errors.h"
+#include "formats/tile/tile_set.h"
+#include "pipeline/survey/memory_share.h"
+#include "pipeline/verify/verify.h"
 #include "tests/build_fixture.h"
 #include "tests/temporary_folder.h"
 

@@ -8,12 +8,12 @@
 #include <random>
 #include <set>
 
-#include "pipeline/check_available.h"
-#include "pipeline/check_finding.h"
-#include "pipeline/check_sample.h"
-#include "pipeline/check_tile_answer.h"
-#include "pipeline/web_address.h"
-#include "stages/geodesy.h"
+#include "pipeline/web_check/check_available.h"
+#include "pipeline/web_check/check_finding.h"
+#include "pipeline/web_check/check_sample.h"
+#include "pipeline/web_check/check_tile_answer.h"
+#include "pipeline/web_check/web_address.h"
+#include "stages/surface/geodesy.h"
 
 namespace qmpipe {
 namespace {

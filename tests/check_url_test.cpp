@@ -1,7 +1,7 @@
 // `qmpipe check` on hand-made answers, without a server: what depends on addresses, on many answers
 // together, and on answers that no server would think of. Faults of real servers:
 // check_server_test.py.
-#include "pipeline/check_url.h"
+#include "pipeline/web_check/check_url.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,12 +12,12 @@
 #include <random>
 #include <set>
 
-#include "formats/errors.h"
-#include "formats/file_bytes.h"
-#include "formats/gzip.h"
-#include "formats/tile_path.h"
-#include "pipeline/check_available.h"
-#include "pipeline/web_address.h"
+#include "formats/bytes/errors.h"
+#include "formats/bytes/file_bytes.h"
+#include "formats/bytes/gzip.h"
+#include "formats/tile/tile_path.h"
+#include "pipeline/web_check/check_available.h"
+#include "pipeline/web_check/web_address.h"
 #include "tests/verify_fixture.h"
 
 namespace qmpipe {

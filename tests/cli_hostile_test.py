@@ -21,7 +21,7 @@ QMPIPE = None
 COMMANDS = (["build"], ["verify"], ["serve"], ["check"], ["compare"], ["convert"], ["pack"],
             ["unpack"], ["diff"], ["info"], ["tin"], ["synth"], ["detail", "build"],
             ["detail", "extract"], ["detail", "info"], ["detail", "verify"])
-# Of the help: the type names of options that take a number (tools/number_options.h), and of others.
+# Of the help: the type names of options that take a number (tools/arguments/number_options.h), and of others.
 NUMBERS = re.compile(r"(INT|UINT|FLOAT|SECONDS|X,Y,Z|[A-Z])$")
 TEXTS = {"TEXT", "OUT", "CRS", "SIZE", "FILE", "DIR", "MESH", "HTML", "REPORT", "LIST", "SHARE",
          "INPUT", "VALUES", "NAME=VALUE", "Z=M,...", "ZOOM/X/Y", "LEVEL|none", "ADDRESS", "ORIGIN", "HOW"}

@@ -1,4 +1,4 @@
-#include "stages/collapse_mesh.h"
+#include "stages/edge_collapse/collapse_mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <string>
 
 #include "scheduler/check.h"
-#include "stages/base_tin.h"
-#include "stages/collapse_queue.h"
+#include "stages/edge_collapse/collapse_queue.h"
+#include "stages/surface/base_tin.h"
 
 namespace qmpipe {
 namespace {

@@ -1,5 +1,5 @@
 // The evaluation of methods: its numbers are those of the builds, and its page holds them all.
-#include "pipeline/compare.h"
+#include "pipeline/compare/compare.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/compare_page.h"
-#include "pipeline/compare_tables.h"
+#include "pipeline/compare/compare_page.h"
+#include "pipeline/compare/compare_tables.h"
 #include "tests/build_fixture.h"
 
 namespace qmpipe {

@@ -1,4 +1,4 @@
-#include "stages/constrained_delaunay.h"
+#include "stages/surface/constrained_delaunay.h"
 
 #include <gtest/gtest.h>
 

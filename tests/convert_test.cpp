@@ -1,4 +1,4 @@
-#include "pipeline/convert.h"
+#include "pipeline/convert/convert.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,13 +8,13 @@
 #include <map>
 #include <stdexcept>
 
-#include "formats/errors.h"
-#include "formats/folder_sink.h"
-#include "formats/gzip.h"
-#include "formats/layer_json.h"
-#include "formats/mbtiles.h"
-#include "formats/pmtiles.h"
-#include "pipeline/ordered_work.h"
+#include "formats/bytes/errors.h"
+#include "formats/bytes/gzip.h"
+#include "formats/mbtiles/mbtiles.h"
+#include "formats/pmtiles/pmtiles.h"
+#include "formats/tile/layer_json.h"
+#include "formats/tile_sets/folder_sink.h"
+#include "pipeline/run/ordered_work.h"
 #include "tests/verify_fixture.h"
 
 namespace qmpipe {

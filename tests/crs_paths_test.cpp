@@ -1,5 +1,5 @@
 // The texts of a CRS that name files, in every spelling that PROJ takes, and those that name none.
-#include "formats/crs_paths.h"
+#include "formats/crs/paths.h"
 
 #include <cpl_conv.h>
 #include <cpl_string.h>
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/foreign_crs.h"
+#include "formats/crs/foreign.h"
 
 namespace qmpipe {
 namespace {

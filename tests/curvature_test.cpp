@@ -1,4 +1,4 @@
-#include "stages/curvature.h"
+#include "stages/surface/curvature.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "stages/geodesy.h"
+#include "stages/surface/geodesy.h"
 
 namespace qmpipe {
 namespace {

@@ -1,5 +1,5 @@
 // Where a set says that its data are, on rasters with corners and holes of random shapes and places.
-#include "pipeline/data_cover.h"
+#include "pipeline/survey/data_cover.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "stages/delaunay.h"
+#include "stages/surface/delaunay.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/detail_base.h"
+#include "stages/detail_model/base.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "stages/collapse_mesh.h"
+#include "stages/edge_collapse/collapse_mesh.h"
 
 namespace qmpipe {
 namespace {

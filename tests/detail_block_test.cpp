@@ -1,4 +1,4 @@
-#include "stages/detail_block.h"
+#include "stages/detail_model/block.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <set>
 #include <string>
 
-#include "stages/detail_increment.h"
+#include "stages/detail_model/increment.h"
 #include "tests/detail_fixture.h"
 
 namespace qmpipe {

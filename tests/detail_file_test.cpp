@@ -1,4 +1,4 @@
-#include "formats/detail_file.h"
+#include "formats/detail_model/file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,11 +7,11 @@
 #include <span>
 #include <string>
 
-#include "formats/detail_arrays.h"
-#include "formats/detail_file_layout.h"
-#include "formats/errors.h"
-#include "formats/file_bytes.h"
-#include "stages/detail_block.h"
+#include "formats/bytes/errors.h"
+#include "formats/bytes/file_bytes.h"
+#include "formats/detail_model/arrays.h"
+#include "formats/detail_model/file_layout.h"
+#include "stages/detail_model/block.h"
 #include "tests/detail_fixture.h"
 #include "tests/random_detail_model.h"
 #include "tests/temporary_folder.h"

@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "formats/detail_data.h"
+#include "formats/detail_model/data.h"
 
 namespace qmpipe::testing {
 

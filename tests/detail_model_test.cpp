@@ -1,4 +1,4 @@
-#include "pipeline/detail_build.h"
+#include "pipeline/detail_model/build.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,9 +10,9 @@
 #include <random>
 #include <string>
 
-#include "formats/errors.h"
-#include "pipeline/detail_extract.h"
-#include "pipeline/detail_verify.h"
+#include "formats/bytes/errors.h"
+#include "pipeline/detail_model/extract.h"
+#include "pipeline/detail_model/verify.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe {

@@ -1,4 +1,4 @@
-#include "stages/detail_simplify.h"
+#include "stages/detail_model/simplify.h"
 
 #include <gtest/gtest.h>
 

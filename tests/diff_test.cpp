@@ -1,4 +1,4 @@
-#include "pipeline/diff_sets.h"
+#include "pipeline/convert/diff_sets.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <atomic>
 
-#include "formats/gzip.h"
-#include "formats/tile_set.h"
+#include "formats/bytes/gzip.h"
+#include "formats/tile/tile_set.h"
 #include "tests/verify_fixture.h"
 
 namespace qmpipe {

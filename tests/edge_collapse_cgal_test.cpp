@@ -11,8 +11,8 @@
 #include <random>
 #include <set>
 
-#include "stages/base_tin.h"
-#include "stages/collapse_surface.h"
+#include "stages/edge_collapse/collapse_surface.h"
+#include "stages/surface/base_tin.h"
 
 namespace qmpipe {
 namespace {

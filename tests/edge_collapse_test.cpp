@@ -1,4 +1,4 @@
-#include "stages/edge_collapse.h"
+#include "stages/edge_collapse/edge_collapse.h"
 
 #include <gtest/gtest.h>
 
@@ -7,11 +7,11 @@
 #include <limits>
 #include <set>
 
-#include "stages/base_tin.h"
-#include "stages/collapse_surface.h"
-#include "stages/height_step.h"
-#include "stages/quantize.h"
-#include "stages/tile_error.h"
+#include "stages/edge_collapse/collapse_surface.h"
+#include "stages/finish/quantize.h"
+#include "stages/finish/tile_error.h"
+#include "stages/posts/height_step.h"
+#include "stages/surface/base_tin.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe {

@@ -1,4 +1,4 @@
-#include "formats/fit_layer_json.h"
+#include "formats/tile_sets/fit_layer_json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

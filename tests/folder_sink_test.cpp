@@ -1,5 +1,5 @@
-#include "formats/folder_sink.h"
-#include "formats/layer_json.h"
+#include "formats/tile_sets/folder_sink.h"
+#include "formats/tile/layer_json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 
 #include <thread>
 
-#include "formats/errors.h"
+#include "formats/bytes/errors.h"
 #include "tests/file_size_limit.h"
 #include "tests/temporary_folder.h"
 

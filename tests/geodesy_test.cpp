@@ -1,4 +1,4 @@
-#include "stages/geodesy.h"
+#include "stages/surface/geodesy.h"
 
 #include <gtest/gtest.h>
 

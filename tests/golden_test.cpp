@@ -10,9 +10,9 @@
 #include <iterator>
 #include <regex>
 
-#include "formats/quantized_mesh.h"
-#include "formats/tile_set.h"
-#include "pipeline/build.h"
+#include "formats/tile/quantized_mesh.h"
+#include "formats/tile/tile_set.h"
+#include "pipeline/build/build.h"
 #include "tests/raster_fixture.h"
 #include "tests/temporary_folder.h"
 

@@ -1,12 +1,12 @@
-#include "stages/greedy.h"
+#include "stages/greedy/greedy.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "stages/geodesy.h"
-#include "stages/height_step.h"
+#include "stages/posts/height_step.h"
+#include "stages/surface/geodesy.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe {

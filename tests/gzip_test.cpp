@@ -1,4 +1,4 @@
-#include "formats/gzip.h"
+#include "formats/bytes/gzip.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

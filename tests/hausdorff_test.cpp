@@ -1,4 +1,4 @@
-#include "pipeline/hausdorff.h"
+#include "pipeline/common/hausdorff.h"
 
 #include <gtest/gtest.h>
 
@@ -8,11 +8,11 @@
 #include <random>
 #include <vector>
 
-#include "pipeline/nearest_grid.h"
-#include "stages/geodesy.h"
-#include "stages/greedy.h"
-#include "stages/mesh_order.h"
-#include "stages/quantize.h"
+#include "pipeline/common/nearest_grid.h"
+#include "stages/finish/mesh_order.h"
+#include "stages/finish/quantize.h"
+#include "stages/greedy/greedy.h"
+#include "stages/surface/geodesy.h"
 
 namespace qmpipe::testing {
 namespace {

@@ -7,11 +7,11 @@
 #include <span>
 #include <string>
 
-#include "formats/errors.h"
-#include "formats/file_bytes.h"
-#include "formats/file_seal.h"
-#include "formats/hdf5_border_store.h"
-#include "formats/little_endian.h"
+#include "formats/bytes/errors.h"
+#include "formats/bytes/file_bytes.h"
+#include "formats/bytes/little_endian.h"
+#include "formats/bytes/seal.h"
+#include "formats/run_store/hdf5_border_store.h"
 #include "tests/random_borders.h"
 #include "tests/temporary_folder.h"
 

@@ -1,5 +1,5 @@
 // The border store on disk: runs that go on where another was killed, full disks, and other readers.
-#include "formats/hdf5_border_store.h"
+#include "formats/run_store/hdf5_border_store.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,9 +9,9 @@
 #include <algorithm>
 #include <string>
 
-#include "formats/errors.h"
-#include "formats/file_bytes.h"
-#include "formats/hdf5_lattice_store.h"
+#include "formats/bytes/errors.h"
+#include "formats/bytes/file_bytes.h"
+#include "formats/run_store/hdf5_lattice_store.h"
 #include "tests/file_size_limit.h"
 #include "tests/program_output.h"
 #include "tests/random_borders.h"

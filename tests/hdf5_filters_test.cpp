@@ -8,10 +8,10 @@
 #include <cstdlib>
 #include <vector>
 
-#include "formats/detail_arrays.h"
-#include "formats/detail_file.h"
-#include "formats/hdf5_handle.h"
-#include "formats/segment_files.h"
+#include "formats/detail_model/arrays.h"
+#include "formats/detail_model/file.h"
+#include "formats/hdf5/handle.h"
+#include "formats/hdf5/segment_files.h"
 #include "tests/random_borders.h"
 #include "tests/random_detail_model.h"
 #include "tests/temporary_folder.h"

@@ -9,12 +9,12 @@
 #include <string>
 #include <thread>
 
-#include "formats/errors.h"
-#include "formats/file_bytes.h"
-#include "formats/file_seal.h"
-#include "formats/hdf5_lattice_store.h"
-#include "formats/little_endian.h"
-#include "formats/segment_files.h"
+#include "formats/bytes/errors.h"
+#include "formats/bytes/file_bytes.h"
+#include "formats/bytes/little_endian.h"
+#include "formats/bytes/seal.h"
+#include "formats/hdf5/segment_files.h"
+#include "formats/run_store/hdf5_lattice_store.h"
 #include "tests/lattice_blocks.h"
 #include "tests/program_output.h"
 #include "tests/small_disk.h"

@@ -4,10 +4,12 @@
 # source of one line is compiled into an object library that nobody links. They are found by globbing,
 # here and nowhere else: a list would let a new header escape.
 # A header of ours needs no third-party library (layering_test.py), hence no include path but ours.
-file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}
+file(GLOB_RECURSE headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}
   ${PROJECT_SOURCE_DIR}/scheduler/*.h ${PROJECT_SOURCE_DIR}/formats/*.h
   ${PROJECT_SOURCE_DIR}/stages/*.h ${PROJECT_SOURCE_DIR}/pipeline/*.h
   ${PROJECT_SOURCE_DIR}/tools/*.h ${PROJECT_SOURCE_DIR}/tests/*.h ${PROJECT_SOURCE_DIR}/perf/*.h)
+# Of npm packages.
+list(FILTER headers EXCLUDE REGEX "/node_modules/")
 
 set(sources)
 foreach(header IN LISTS headers)

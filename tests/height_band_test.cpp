@@ -1,5 +1,5 @@
 // Which numbers of a file are its heights: bands, pictures, the grids of a container.
-#include "formats/height_band.h"
+#include "formats/heights/band.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <random>
 #include <regex>
 
-#include "formats/encoded_heights.h"
-#include "formats/errors.h"
+#include "formats/bytes/errors.h"
+#include "formats/heights/encoded.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

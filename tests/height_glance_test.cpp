@@ -1,5 +1,5 @@
 // The height range of a set, from a few of its tiles.
-#include "pipeline/height_glance.h"
+#include "pipeline/verify/height_glance.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/quantized_mesh.h"
+#include "formats/tile/quantized_mesh.h"
 #include "scheduler/tiling_scheme.h"
 #include "tests/random_mesh.h"
 

@@ -1,12 +1,12 @@
 // What the numbers of a band mean: which way up, in which unit, above what.
-#include "formats/height_rule.h"
+#include "formats/heights/rule.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "formats/height_unit.h"
+#include "formats/raster/height_unit.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

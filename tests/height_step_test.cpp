@@ -1,4 +1,4 @@
-#include "stages/height_step.h"
+#include "stages/posts/height_step.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Values that can be no heights: found pixel by pixel, told with an option that works, and nothing said
 // of good data.
-#include "formats/height_tally.h"
+#include "formats/heights/tally.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,8 +11,8 @@
 #include <random>
 #include <regex>
 
-#include "formats/errors.h"
-#include "formats/value_counts.h"
+#include "formats/bytes/errors.h"
+#include "formats/heights/value_counts.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

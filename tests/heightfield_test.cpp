@@ -1,4 +1,4 @@
-#include "stages/heightfield.h"
+#include "stages/posts/heightfield.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <limits>
 #include <set>
 
-#include "stages/reduce.h"
+#include "stages/posts/reduce.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe {

@@ -1,5 +1,5 @@
 // Files on one grid are one raster: however it was cut, its posts are the same, bit for bit.
-#include "formats/joined_grids.h"
+#include "formats/sources/joined_grids.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <random>
 #include <string>
 
-#include "formats/grid_pixels.h"
-#include "stages/sampling.h"
+#include "formats/sources/grid_pixels.h"
+#include "stages/posts/sampling.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

@@ -1,12 +1,12 @@
 // The journal keeps what was appended, drops what a crash tore, and refuses what was damaged.
-#include "formats/journal.h"
+#include "formats/bytes/journal.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "formats/errors.h"
+#include "formats/bytes/errors.h"
 #include "tests/file_size_limit.h"
 #include "tests/temporary_folder.h"
 

@@ -1,5 +1,5 @@
 // The LAS parser on files written byte by byte, whole and damaged.
-#include "formats/las_file.h"
+#include "formats/points/las_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "formats/little_endian.h"
+#include "formats/bytes/little_endian.h"
 #include "tests/las_fixture.h"
 
 namespace qmpipe {

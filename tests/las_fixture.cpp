@@ -3,7 +3,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "formats/little_endian.h"
+#include "formats/bytes/little_endian.h"
 
 namespace qmpipe::testing {
 namespace {

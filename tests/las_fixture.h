@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "formats/las_file.h"
+#include "formats/points/las_file.h"
 
 namespace qmpipe::testing {
 

@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "formats/lattice_store.h"
-#include "formats/lattice_window.h"
+#include "formats/run_store/lattice_store.h"
+#include "formats/run_store/lattice_window.h"
 
 namespace qmpipe::testing {
 

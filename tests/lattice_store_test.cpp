@@ -6,10 +6,10 @@
 #include <string>
 #include <thread>
 
-#include "formats/block_codec.h"
-#include "formats/hdf5_lattice_store.h"
-#include "formats/recent_cache.h"
-#include "formats/tiered_lattice_store.h"
+#include "formats/bytes/recent_cache.h"
+#include "formats/run_store/block_codec.h"
+#include "formats/run_store/hdf5_lattice_store.h"
+#include "formats/run_store/tiered_lattice_store.h"
 #include "tests/lattice_blocks.h"
 #include "tests/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "formats/layer_json.h"
+#include "formats/tile/layer_json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

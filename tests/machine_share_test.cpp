@@ -1,4 +1,4 @@
-#include "pipeline/machine_share.h"
+#include "pipeline/common/machine_share.h"
 
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -7,7 +7,7 @@
 #include <string>
 #include <thread>
 
-#include "pipeline/process_memory.h"
+#include "pipeline/common/process_memory.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe::testing {

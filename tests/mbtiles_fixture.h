@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "formats/errors.h"
-#include "formats/layer_json.h"
-#include "formats/mbtiles.h"
+#include "formats/bytes/errors.h"
+#include "formats/mbtiles/mbtiles.h"
+#include "formats/tile/layer_json.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe::testing {

@@ -7,7 +7,7 @@
 #include <csignal>
 #include <thread>
 
-#include "formats/mbtiles.h"
+#include "formats/mbtiles/mbtiles.h"
 #include "tests/file_size_limit.h"
 #include "tests/mbtiles_fixture.h"
 #include "tests/small_disk.h"

@@ -5,10 +5,10 @@
 #include <random>
 #include <thread>
 
-#include "formats/errors.h"
-#include "formats/mbtiles.h"
-#include "formats/mbtiles_schema.h"
-#include "formats/sqlite_file.h"
+#include "formats/bytes/errors.h"
+#include "formats/mbtiles/mbtiles.h"
+#include "formats/mbtiles/schema.h"
+#include "formats/mbtiles/sqlite_file.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {

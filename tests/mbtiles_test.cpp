@@ -1,12 +1,12 @@
-#include "formats/mbtiles.h"
+#include "formats/mbtiles/mbtiles.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <map>
 
-#include "formats/sqlite_file.h"
-#include "formats/tile_output.h"
+#include "formats/mbtiles/sqlite_file.h"
+#include "formats/tile_sets/tile_output.h"
 #include "tests/mbtiles_fixture.h"
 
 namespace qmpipe::testing {

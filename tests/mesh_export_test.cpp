@@ -1,4 +1,4 @@
-#include "formats/mesh_export.h"
+#include "formats/tile/mesh_export.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "formats/errors.h"
+#include "formats/bytes/errors.h"
 #include "scheduler/check.h"
 #include "tests/temporary_folder.h"
 

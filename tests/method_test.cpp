@@ -1,4 +1,4 @@
-#include "pipeline/method.h"
+#include "pipeline/recipe/method.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "formats/errors.h"
+#include "formats/bytes/errors.h"
 #include "tests/temporary_folder.h"
 #include "tests/terrain_fixture.h"
 

@@ -1,11 +1,11 @@
-#include "stages/normals.h"
+#include "stages/finish/normals.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "formats/oct_normal.h"
-#include "stages/geodesy.h"
+#include "formats/tile/oct_normal.h"
+#include "stages/surface/geodesy.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe {

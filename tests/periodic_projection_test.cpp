@@ -6,8 +6,8 @@
 #include <random>
 #include <string>
 
-#include "formats/crs_transform.h"
-#include "stages/sampling.h"
+#include "formats/crs/transform.h"
+#include "stages/posts/sampling.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

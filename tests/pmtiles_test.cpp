@@ -1,4 +1,4 @@
-#include "formats/pmtiles.h"
+#include "formats/pmtiles/pmtiles.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,11 +8,11 @@
 #include <random>
 #include <set>
 
-#include "formats/errors.h"
-#include "formats/gzip.h"
-#include "formats/layer_json.h"
-#include "formats/pmtiles_directory.h"
-#include "formats/pmtiles_id.h"
+#include "formats/bytes/errors.h"
+#include "formats/bytes/gzip.h"
+#include "formats/pmtiles/directory.h"
+#include "formats/pmtiles/id.h"
+#include "formats/tile/layer_json.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {

@@ -1,5 +1,5 @@
 // read_point_cloud() on LAS files: the grid, units and CRS, what is left out, a real survey.
-#include "formats/point_cloud.h"
+#include "formats/points/point_cloud.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <map>
 #include <random>
 
-#include "formats/errors.h"
+#include "formats/bytes/errors.h"
 #include "tests/las_fixture.h"
 #include "tests/raster_fixture.h"
 #include "tests/temporary_folder.h"

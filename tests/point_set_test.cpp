@@ -1,4 +1,4 @@
-#include "stages/point_set.h"
+#include "stages/point_sets/point_set.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <thread>
 
-#include "stages/height_step.h"
+#include "stages/posts/height_step.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe {

@@ -1,4 +1,4 @@
-#include "stages/point_subset.h"
+#include "stages/point_sets/point_subset.h"
 
 #include <CGAL/Simple_cartesian.h>
 #include <CGAL/grid_simplify_point_set.h>

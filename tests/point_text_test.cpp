@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "formats/errors.h"
-#include "formats/point_cloud.h"
+#include "formats/bytes/errors.h"
+#include "formats/points/point_cloud.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {

@@ -1,4 +1,4 @@
-#include "stages/polylines.h"
+#include "stages/point_sets/polylines.h"
 
 #include <CGAL/Constrained_Delaunay_triangulation_2.h>
 #include <CGAL/Constrained_triangulation_plus_2.h>
@@ -10,9 +10,9 @@
 #include <cmath>
 #include <map>
 
-#include "stages/base_tin.h"
-#include "stages/metric_frame.h"
-#include "stages/sharp_edges.h"
+#include "stages/point_sets/sharp_edges.h"
+#include "stages/surface/base_tin.h"
+#include "stages/surface/metric_frame.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe {

@@ -1,4 +1,4 @@
-#include "formats/printable.h"
+#include "formats/bytes/printable.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "pipeline/progress.h"
+#include "pipeline/run/progress.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -9,7 +9,7 @@
 
 #include <random>
 
-#include "formats/printable.h"
+#include "formats/bytes/printable.h"
 #include "tests/terminal_model.h"
 
 namespace qmpipe {

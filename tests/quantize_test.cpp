@@ -1,4 +1,4 @@
-#include "stages/quantize.h"
+#include "stages/finish/quantize.h"
 
 #include <gtest/gtest.h>
 
@@ -6,10 +6,10 @@
 #include <cmath>
 #include <map>
 
-#include "stages/geodesy.h"
-#include "stages/greedy.h"
-#include "stages/height_step.h"
-#include "stages/mesh_order.h"
+#include "stages/finish/mesh_order.h"
+#include "stages/greedy/greedy.h"
+#include "stages/posts/height_step.h"
+#include "stages/surface/geodesy.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe {

@@ -1,4 +1,4 @@
-#include "formats/quantized_mesh.h"
+#include "formats/tile/quantized_mesh.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "formats/oct_normal.h"
+#include "formats/tile/oct_normal.h"
 #include "tests/independent_reader.h"
 #include "tests/random_mesh.h"
 

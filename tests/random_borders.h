@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "formats/border_chunk.h"
-#include "formats/file_bytes.h"
-#include "formats/hdf5_border_store.h"
-#include "formats/segment_files.h"
+#include "formats/bytes/file_bytes.h"
+#include "formats/hdf5/segment_files.h"
+#include "formats/run_store/border_chunk.h"
+#include "formats/run_store/hdf5_border_store.h"
 
 namespace qmpipe::testing {
 

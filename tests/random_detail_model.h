@@ -1,5 +1,5 @@
 // Random models for the tests of the detail-increment model's file: without fault
-// (detail_check.h), but without any meaning as terrain.
+// (formats/detail_model/check.h), but without any meaning as terrain.
 #pragma once
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include <random>
 #include <utility>
 
-#include "formats/detail_data.h"
+#include "formats/detail_model/data.h"
 
 namespace qmpipe::testing {
 

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "formats/quantized_mesh.h"
+#include "formats/tile/quantized_mesh.h"
 
 namespace qmpipe::testing {
 

@@ -5,7 +5,7 @@
 #include <random>
 #include <string>
 
-#include "stages/sampling.h"
+#include "stages/posts/sampling.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

@@ -11,7 +11,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "formats/joined_grids.h"
+#include "formats/sources/joined_grids.h"
 
 namespace qmpipe::testing {
 namespace {

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "formats/raster_source.h"
-#include "formats/source_pool.h"
+#include "formats/sources/raster_source.h"
+#include "formats/sources/source_pool.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe::testing {

@@ -1,5 +1,5 @@
 // Rasters that cannot be placed, each refused with the remedy that works, and those that only seem so.
-#include "formats/raster_plane.h"
+#include "formats/raster/plane.h"
 
 #include <gdal_priv.h>
 #include <gmock/gmock.h>
@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "formats/errors.h"
+#include "formats/bytes/errors.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

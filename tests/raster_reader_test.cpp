@@ -1,6 +1,6 @@
 // Both ways of reading a raster, straight from GDAL and through a cache of decoded blocks, give the
 // same heights, whatever the file is like inside.
-#include "formats/raster_reader.h"
+#include "formats/raster/reader.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <random>
 #include <thread>
 
-#include "formats/errors.h"
+#include "formats/bytes/errors.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

@@ -1,4 +1,4 @@
-#include "formats/raster_source.h"
+#include "formats/sources/raster_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <fstream>
 #include <limits>
 
-#include "formats/errors.h"
-#include "formats/height_unit.h"
+#include "formats/bytes/errors.h"
+#include "formats/raster/height_unit.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "formats/raster_source.h"
+#include "formats/sources/raster_source.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

@@ -1,4 +1,4 @@
-#include "stages/reduce.h"
+#include "stages/posts/reduce.h"
 
 #include <gtest/gtest.h>
 

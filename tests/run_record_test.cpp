@@ -1,12 +1,12 @@
 // A run is gone on with when, and only when, it is the same run.
-#include "pipeline/run_record.h"
+#include "pipeline/run/run_record.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "formats/errors.h"
-#include "pipeline/fingerprint.h"
-#include "pipeline/report_state.h"
+#include "formats/bytes/errors.h"
+#include "pipeline/build/report_state.h"
+#include "pipeline/recipe/fingerprint.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe {

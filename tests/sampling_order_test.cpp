@@ -1,4 +1,4 @@
-#include "pipeline/sampling_order.h"
+#include "pipeline/survey/sampling_order.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <random>
 #include <set>
 
-#include "formats/lattice_store.h"
+#include "formats/run_store/lattice_store.h"
 
 namespace qmpipe {
 namespace {

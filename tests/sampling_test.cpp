@@ -1,4 +1,4 @@
-#include "stages/sampling.h"
+#include "stages/posts/sampling.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "stages/post_positions.h"
+#include "stages/posts/post_positions.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

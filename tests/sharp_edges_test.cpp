@@ -1,4 +1,4 @@
-#include "stages/sharp_edges.h"
+#include "stages/point_sets/sharp_edges.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "stages/base_tin.h"
+#include "stages/surface/base_tin.h"
 
 namespace qmpipe {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "pipeline/method.h"
-#include "stages/curvature.h"
-#include "stages/geodesy.h"
+#include "pipeline/recipe/method.h"
+#include "stages/surface/curvature.h"
+#include "stages/surface/geodesy.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe::testing {

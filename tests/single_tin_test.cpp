@@ -1,5 +1,5 @@
 // One DEM to one TIN: what its options promise, on rasters small enough to be judged by brute force.
-#include "pipeline/single_tin.h"
+#include "pipeline/tin/single_tin.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "formats/errors.h"
+#include "formats/bytes/errors.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe {

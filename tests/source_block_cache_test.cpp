@@ -1,4 +1,4 @@
-#include "formats/source_block_cache.h"
+#include "formats/raster/block_cache.h"
 
 #include <gtest/gtest.h>
 

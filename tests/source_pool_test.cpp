@@ -1,4 +1,4 @@
-#include "formats/source_pool.h"
+#include "formats/sources/source_pool.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <random>
 
-#include "formats/errors.h"
+#include "formats/bytes/errors.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "formats/errors.h"
-#include "pipeline/sampling_order.h"
-#include "pipeline/survey.h"
+#include "formats/bytes/errors.h"
+#include "pipeline/survey/sampling_order.h"
+#include "pipeline/survey/survey.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe {

@@ -1,5 +1,5 @@
 // A survey's file gives back what was written, and nothing else.
-#include "formats/survey_file.h"
+#include "formats/run_store/survey_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <random>
 #include <set>
 
-#include "formats/file_bytes.h"
-#include "formats/file_seal.h"
+#include "formats/bytes/file_bytes.h"
+#include "formats/bytes/seal.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {

@@ -1,9 +1,9 @@
-#include "pipeline/svg.h"
+#include "pipeline/common/svg.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stages/greedy.h"
+#include "stages/greedy/greedy.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe {

@@ -1,4 +1,4 @@
-#include "stages/synth_terrain.h"
+#include "stages/synth/synth_terrain.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "formats/errors.h"
-#include "formats/raster_writer.h"
+#include "formats/bytes/errors.h"
+#include "formats/raster/writer.h"
 #include "tests/raster_fixture.h"
 
 namespace qmpipe::testing {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "formats/printable.h"
+#include "formats/bytes/printable.h"
 
 namespace qmpipe::testing {
 

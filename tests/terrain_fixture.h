@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "formats/lattice_store.h"
-#include "formats/quantized_mesh.h"
-#include "stages/greedy.h"
-#include "stages/tin.h"
+#include "formats/run_store/lattice_store.h"
+#include "formats/tile/quantized_mesh.h"
+#include "stages/greedy/greedy.h"
+#include "stages/surface/tin.h"
 
 namespace qmpipe::testing {
 

@@ -1,13 +1,13 @@
-#include "stages/tile_error.h"
+#include "stages/finish/tile_error.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "stages/finer_error.h"
-#include "stages/greedy.h"
-#include "stages/mesh_order.h"
-#include "stages/quantize.h"
+#include "stages/finish/finer_error.h"
+#include "stages/finish/mesh_order.h"
+#include "stages/finish/quantize.h"
+#include "stages/greedy/greedy.h"
 #include "tests/terrain_fixture.h"
 
 namespace qmpipe {

@@ -1,13 +1,13 @@
-#include "formats/tile_set.h"
+#include "formats/tile/tile_set.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "formats/errors.h"
-#include "formats/folder_sink.h"
-#include "formats/gzip.h"
-#include "formats/layer_json.h"
+#include "formats/bytes/errors.h"
+#include "formats/bytes/gzip.h"
+#include "formats/tile/layer_json.h"
+#include "formats/tile_sets/folder_sink.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {

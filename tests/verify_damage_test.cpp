@@ -1,6 +1,6 @@
 // Each kind of damage is found under its own name and no other: a verify that cannot fail would be
 // worthless.
-#include "pipeline/verify.h"
+#include "pipeline/verify/verify.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "formats/oct_normal.h"
+#include "formats/tile/oct_normal.h"
 #include "tests/verify_fixture.h"
 
 namespace qmpipe::testing {

@@ -7,15 +7,15 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "formats/file_bytes.h"
-#include "formats/folder_sink.h"
-#include "formats/gzip.h"
-#include "formats/layer_json.h"
-#include "formats/tile_path.h"
-#include "stages/greedy.h"
-#include "stages/mesh_order.h"
-#include "stages/normals.h"
-#include "stages/quantize.h"
+#include "formats/bytes/file_bytes.h"
+#include "formats/bytes/gzip.h"
+#include "formats/tile/layer_json.h"
+#include "formats/tile/tile_path.h"
+#include "formats/tile_sets/folder_sink.h"
+#include "stages/finish/mesh_order.h"
+#include "stages/finish/normals.h"
+#include "stages/finish/quantize.h"
+#include "stages/greedy/greedy.h"
 
 namespace qmpipe::testing {
 namespace {

@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "formats/layer_json.h"
-#include "formats/quantized_mesh.h"
-#include "pipeline/verify.h"
-#include "stages/heightfield.h"
+#include "formats/tile/layer_json.h"
+#include "formats/tile/quantized_mesh.h"
+#include "pipeline/verify/verify.h"
+#include "stages/posts/heightfield.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe::testing {

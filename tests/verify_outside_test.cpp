@@ -1,4 +1,4 @@
-#include "pipeline/verify_outside.h"
+#include "pipeline/verify/outside.h"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <functional>
 #include <random>
 
-#include "stages/greedy.h"
-#include "stages/mesh_order.h"
-#include "stages/quantize.h"
+#include "stages/finish/mesh_order.h"
+#include "stages/finish/quantize.h"
+#include "stages/greedy/greedy.h"
 
 namespace qmpipe::testing {
 namespace {

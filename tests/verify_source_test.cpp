@@ -4,9 +4,9 @@
 
 #include <cmath>
 
-#include "formats/errors.h"
-#include "pipeline/build.h"
-#include "pipeline/verify.h"
+#include "formats/bytes/errors.h"
+#include "pipeline/build/build.h"
+#include "pipeline/verify/verify.h"
 #include "tests/raster_fixture.h"
 #include "tests/verify_fixture.h"
 

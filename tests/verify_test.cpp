@@ -1,13 +1,13 @@
 // What verify says of a whole set: nothing of a sound one, everything it should count of others.
-#include "pipeline/verify.h"
+#include "pipeline/verify/verify.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "formats/errors.h"
-#include "pipeline/verify_tile.h"
+#include "formats/bytes/errors.h"
+#include "pipeline/verify/tile.h"
 #include "tests/verify_fixture.h"
 
 namespace qmpipe::testing {

@@ -1,4 +1,4 @@
-#include "pipeline/verify_visibility.h"
+#include "pipeline/verify/visibility.h"
 
 #include <gtest/gtest.h>
 

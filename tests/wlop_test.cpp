@@ -1,4 +1,4 @@
-#include "stages/wlop.h"
+#include "stages/point_sets/wlop.h"
 
 #include <CGAL/Simple_cartesian.h>
 #include <CGAL/wlop_simplify_and_regularize_point_set.h>
@@ -10,7 +10,7 @@
 #include <numeric>
 #include <random>
 
-#include "stages/point_cells.h"
+#include "stages/point_sets/point_cells.h"
 
 namespace qmpipe {
 namespace {

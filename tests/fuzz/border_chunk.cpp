@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <span>
 
-#include "formats/border_chunk.h"
+#include "formats/run_store/border_chunk.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size < 2) return 0;

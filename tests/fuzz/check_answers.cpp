@@ -12,9 +12,9 @@
 #include <span>
 #include <string>
 
-#include "formats/gzip.h"
-#include "formats/hash64.h"
-#include "pipeline/check_url.h"
+#include "formats/bytes/gzip.h"
+#include "formats/bytes/hash64.h"
+#include "pipeline/web_check/check_url.h"
 #include "scheduler/tile_key.h"
 
 namespace {

@@ -7,9 +7,9 @@
 #include <cstdlib>
 #include <span>
 
-#include "formats/detail_arrays.h"
-#include "formats/little_endian.h"
-#include "formats/word_chunk.h"
+#include "formats/bytes/little_endian.h"
+#include "formats/detail_model/arrays.h"
+#include "formats/hdf5/word_chunk.h"
 
 namespace {
 

@@ -4,9 +4,9 @@
 #include <cstdlib>
 #include <vector>
 
-#include "formats/detail_arrays.h"
-#include "formats/detail_file.h"
-#include "formats/file_seal.h"
+#include "formats/bytes/seal.h"
+#include "formats/detail_model/arrays.h"
+#include "formats/detail_model/file.h"
 #include "tests/fuzz/file_in_memory.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,6 +1,6 @@
 // Any bytes: gzip_decompress() neither throws nor over-reads, and keeps its limit. What it accepts
 // comes back the same after another round.
-#include "formats/gzip.h"
+#include "formats/bytes/gzip.h"
 
 #include <cstdint>
 #include <cstdlib>

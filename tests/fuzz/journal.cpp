@@ -1,6 +1,6 @@
 // Any bytes: parse_journal() neither throws nor over-reads. What it accepts is the same when the part
 // that it calls sound is read alone.
-#include "formats/journal.h"
+#include "formats/bytes/journal.h"
 
 #include <cstdint>
 #include <cstdlib>

@@ -1,6 +1,6 @@
 // Any bytes: read_las_header() neither throws nor reads outside the source, and a header it accepts
 // gives as many points as it says.
-#include "formats/las_file.h"
+#include "formats/points/las_file.h"
 
 #include <cmath>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Any text: parse_layer_json() does not throw. What it accepts is written and read back equal.
-#include "formats/layer_json.h"
+#include "formats/tile/layer_json.h"
 
 #include <cstdint>
 #include <cstdlib>

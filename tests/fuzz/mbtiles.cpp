@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <iterator>
 
-#include "formats/errors.h"
-#include "formats/mbtiles.h"
-#include "formats/tile_set.h"
+#include "formats/bytes/errors.h"
+#include "formats/mbtiles/mbtiles.h"
+#include "formats/tile/tile_set.h"
 #include "tests/fuzz/file_in_memory.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/pmtiles_directory.h"
+#include "formats/pmtiles/directory.h"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // Any bytes: PointTextParser neither throws nor over-reads, takes the text in pieces of any size alike,
 // and what it accepts is finite. The first byte is the size of the pieces.
-#include "formats/point_text.h"
+#include "formats/points/point_text.h"
 
 #include <algorithm>
 #include <cmath>

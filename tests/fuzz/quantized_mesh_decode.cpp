@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "formats/quantized_mesh.h"
+#include "formats/tile/quantized_mesh.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto tile = qmpipe::decode(std::span(data, size));

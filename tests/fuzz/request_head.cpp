@@ -1,6 +1,6 @@
 // Any bytes: the end of a head is found alike in pieces and at once, parse_request_head() neither throws
 // nor over-reads, and what it takes keeps its limits.
-#include "tools/request_head.h"
+#include "tools/web/request_head.h"
 
 #include <cstdint>
 #include <cstdlib>

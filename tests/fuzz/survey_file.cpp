@@ -1,6 +1,6 @@
 // Any bytes: parse_surveyed_zoom() neither throws nor over-reads. What it accepts is sorted and inside
 // the scheme. The first byte is the zoom.
-#include "formats/survey_file.h"
+#include "formats/run_store/survey_file.h"
 
 #include <cstdint>
 #include <cstdlib>

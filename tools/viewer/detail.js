@@ -1,5 +1,5 @@
 // The page of `qmpipe serve` for a detail-increment model: the mesh follows the eye, block by block. Its
-// increments are fetched once, as splits, and applied here (detail_walk.js). tools/detail_service.h says
+// increments are fetched once, as splits, and applied here (detail_walk.js). tools/web/detail_service.h says
 // which addresses the page asks for.
 //
 // Query: ?heading=DEG&pitch=DEG&range=METRES  from where to look at the middle first

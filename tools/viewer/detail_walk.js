@@ -1,6 +1,6 @@
 // A detail-increment model as its parts come from `qmpipe serve`, and the walk through the levels of a
 // block, on typed arrays. No page is needed: tests run it in Node. The model's rules are those of
-// formats/detail_data.h and docs/DETAIL_FORMAT.md; what the parts hold, tools/detail_service.h says.
+// formats/detail_model/data.h and docs/DETAIL_FORMAT.md; what the parts hold, tools/web/detail_service.h says.
 
 const none = 0xFFFFFFFF;
 const next = (e) => (e % 3 === 2 ? e - 2 : e + 1);

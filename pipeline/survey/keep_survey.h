@@ -1,0 +1,27 @@
+// A survey that lives in memory, put on the disk because its run was asked to stop.
+#pragma once
+
+#include "pipeline/survey/survey.h"
+
+namespace qmpipe {
+
+// Where the survey took longer than options.keep_after_s, and there is a record: writes the lattice of
+// the zooms in memory to the record's folder and counts those that are whole, so that the next run goes
+// on from there. Of the sampling zoom, what is there; of another that is unfinished nothing, for it is
+// reduced again sooner than read.
+// What cannot be written is told as a note: the run ends as one that was stopped all the same.
+void keep_survey(const SurveyOptions& options, const Survey& survey, Progress& progress);
+
+// work(); where it is interrupted, the survey is kept first.
+template <class Work>
+auto keeping_survey(const SurveyOptions& options, const Survey& survey, Progress& progress,
+                    const Work& work) {
+  try {
+    return work();
+  } catch (const Interrupted&) {
+    keep_survey(options, survey, progress);
+    throw;
+  }
+}
+
+}  // namespace qmpipe
