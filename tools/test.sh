@@ -139,9 +139,19 @@ git = lambda *words: subprocess.run(["git", *words], capture_output=True, text=T
 newest = git("log", "-1", "--format=%ct")
 count = git("rev-list", "--count", "HEAD")
 if newest.returncode == 0 and count.returncode == 0 and "QMPIPE_TIDY_ALL" not in os.environ:
-    recent = git("log", "--name-only", "--format=", f"--since=@{int(newest.stdout) - 6 * 3600}").stdout
-    recent += git("diff", "--name-only", "HEAD").stdout
-    changed = {os.path.splitext(f)[0] for f in recent.splitlines()}
+    before = git("rev-list", "-1", f"--before=@{int(newest.stdout) - 6 * 3600}", "HEAD").stdout.strip()
+    empty_tree = git("hash-object", "-t", "tree", "/dev/null").stdout.strip()
+    # Where a file moved, its includes change with it and nothing else. Fields: lines added, removed, and the
+    # path, or an empty one and then the old and the new one.
+    words = git("diff", "-M", "--numstat", "-z", r"-I^\s*#\s*include", before or empty_tree).stdout.split("\0")
+    changed = set()
+    while len(words) > 1:
+        added, removed, path = words.pop(0).split("\t")
+        if not path:
+            path = words.pop(1)
+            words.pop(0)
+        if (added, removed) != ("0", "0"):
+            changed.add(os.path.splitext(path)[0])
     turn = int(count.stdout) % 3
     files = {f for f in files if os.path.splitext(f)[0] in changed or zlib.crc32(f.encode()) % 3 == turn}
 print("\n".join(sorted(files)))
