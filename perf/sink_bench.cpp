@@ -12,7 +12,7 @@
 #include <random>
 #include <thread>
 
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "formats/tile_sets/tile_output.h"
 #include "perf/bench_terrain.h"
 #include "perf/register_benchmarks.h"

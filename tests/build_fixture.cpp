@@ -4,7 +4,7 @@
 #include <numbers>
 #include <random>
 
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "pipeline/verify/verify.h"
 
 namespace qmpipe::testing {

@@ -11,7 +11,7 @@
 #include <random>
 
 #include "formats/bytes/errors.h"
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "pipeline/survey/memory_share.h"
 #include "pipeline/verify/verify.h"
 #include "tests/build_fixture.h"

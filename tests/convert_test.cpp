@@ -14,6 +14,7 @@
 #include "formats/pmtiles/pmtiles.h"
 #include "formats/tile/layer_json.h"
 #include "formats/tile_sets/folder_sink.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "pipeline/run/ordered_work.h"
 #include "tests/verify_fixture.h"
 

@@ -7,7 +7,7 @@
 #include <atomic>
 
 #include "formats/bytes/gzip.h"
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "tests/verify_fixture.h"
 
 namespace qmpipe {

@@ -1,4 +1,5 @@
 #include "formats/tile_sets/fit_layer_json.h"
+#include "formats/tile_sets/open_tile_set.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -11,7 +11,7 @@
 #include <regex>
 
 #include "formats/tile/quantized_mesh.h"
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "pipeline/build/build.h"
 #include "tests/raster_fixture.h"
 #include "tests/temporary_folder.h"

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Holds the layout rules of the repository by reading its files (DESIGN 2, CONVENTIONS 2).
 
-Checked: includes point one way (scheduler <- formats <- stages <- pipeline <- tools; tests and perf
-may include anything); each third-party library is included only where the table below allows it,
+Checked: includes point one way (scheduler <- formats <- stages <- pipeline <- tools, and within a layer
+by the table of its rooms; tests and perf may include anything); each third-party library is included only where the table below allows it,
 and in no header of ours; a .cpp includes its own header first, so that this compiles alone; no function of the C library whose last bits depend on the processor;
 every header opens with a comment and has #pragma once; a name that a header defines is defined
 nowhere else; no file is longer than 600 lines; no top-level folder that nobody agreed on.
@@ -19,6 +19,17 @@ import tempfile
 from defined_names import defined_twice
 
 LAYERS = ["scheduler", "formats", "stages", "pipeline", "tools"]
+# A layer's rooms: each may include those before it. A layer without a line here has none.
+ROOMS = {
+    "formats": ["bytes", "crs", "raster", "heights", "sources", "tile", "mbtiles", "pmtiles", "tile_sets",
+                "hdf5", "run_store", "detail_model", "points"],
+    "stages": ["posts", "synth", "surface", "greedy", "point_sets", "finish", "edge_collapse",
+               "detail_model"],
+    "pipeline": ["common", "recipe", "run", "survey", "build", "verify", "tin", "compare", "convert",
+                 "web_check", "detail_model"],
+    "tools": ["arguments", "web", "commands"],
+}
+NO_ROOM_NEEDED = {"tools/main.cpp"}
 FREE_FOLDERS = ["tests", "perf"]  # these see everything, and nothing of a layer may include them
 ALLOWED_FOLDERS = {*LAYERS, *FREE_FOLDERS, "docs", ".ci"}
 # Never part of the project, whether or not they are there.
@@ -70,14 +81,39 @@ def layer_of(path):
     return path.parts[0]
 
 
+def room_of(path):
+    """None for what stands in no room, or in a layer that has none."""
+    return path.parts[1] if layer_of(path) in ROOMS and len(path.parts) > 2 else None
+
+
+def check_room(path):
+    rooms = ROOMS.get(layer_of(path))
+    if rooms is None or str(path) in NO_ROOM_NEEDED:
+        return
+    if len(path.parts) != 3 or path.parts[1] not in rooms:
+        yield f"{path}: in no room of {layer_of(path)}/: {', '.join(rooms)} (tests/layering_test.py)"
+
+
+def check_way_between_rooms(path, target):
+    layer, here, there = layer_of(path), room_of(path), room_of(pathlib.Path(target))
+    if here not in ROOMS[layer] or there not in ROOMS[layer]:
+        return None
+    if ROOMS[layer].index(there) > ROOMS[layer].index(here):
+        return (f'{layer}/{here}/ includes "{target}": rooms may include those before them, '
+                f'{" <- ".join(ROOMS[layer])}')
+    return None
+
+
 def check_own_include(path, target):
     """An #include "..." line; returns what is wrong with it, or None."""
     folder = target.split("/")[0]
     if "/" not in target or folder not in [*LAYERS, *FREE_FOLDERS]:
         return f'"{target}" is not a path from the repository\'s root; third-party headers go in <>'
     here = layer_of(path)
-    if here in FREE_FOLDERS or folder == here:
+    if here in FREE_FOLDERS:
         return None
+    if folder == here:
+        return check_way_between_rooms(path, target) if here in ROOMS else None
     if folder in FREE_FOLDERS:
         return f'{here}/ includes "{target}": nothing includes {folder}/'
     if LAYERS.index(folder) > LAYERS.index(here):
@@ -168,6 +204,7 @@ def check_tree(root):
         elif len(lines) > WARN_LINES:
             warnings.append(f"{path}: {len(lines)} lines, {WARN_LINES} is long")
         if path.suffix in (".h", ".cpp"):
+            violations += check_room(path)
             violations += check_includes(path, lines)
             violations += check_arithmetic(path, lines)
             sources[path] = "\n".join(lines)
@@ -183,42 +220,44 @@ def check_tree(root):
 # A tree without a fault: every pair that the rules allow and that is easy to get wrong.
 GOOD_TREE = {
     "scheduler/a.h": "// A.\n#pragma once\n#include <vector>\n",
-    "formats/a.cpp": '#include "formats/a.h"\n#include "scheduler/a.h"\n#include <gdal_priv.h>\n'
+    "formats/bytes/a.cpp": '#include "formats/bytes/a.h"\n#include "scheduler/a.h"\n#include <gdal_priv.h>\n'
                      "#include <sqlite3.h>\n#include <zstd.h>\n#include <hdf5.h>\n"
                      "#include <unistd.h>\n#include <libdeflate.h>\n#include <cpl_vsi.h>\n",
-    "stages/a.cpp": '#include "formats/a.h"\n#include <CGAL/Epick.h>\n#include <fmt/format.h>\n'
+    "stages/posts/a.cpp": '#include "formats/bytes/a.h"\n#include <CGAL/Epick.h>\n#include <fmt/format.h>\n'
                     "#include <meshoptimizer.h>\n",
-    "pipeline/a.cpp": '#include "stages/a.h"\n#include <tbb/flow_graph.h>\n'
+    "pipeline/common/a.cpp": '#include "stages/posts/a.h"\n#include <tbb/flow_graph.h>\n'
                       "#include <nlohmann/json.hpp>\n#include <spdlog/spdlog.h>\n",
-    "tools/a.cpp": '#include "pipeline/a.h"\n#include <CLI/CLI.hpp>\n#include <nlohmann/json.hpp>\n',
-    "stages/arithmetic.cpp": 'auto a = "sin(x)";  // std::sin(x)\n'
+    "tools/arguments/a.cpp": '#include "pipeline/common/a.h"\n#include <CLI/CLI.hpp>\n#include <nlohmann/json.hpp>\n',
+    "stages/posts/arithmetic.cpp": 'auto a = "sin(x)";  // std::sin(x)\n'
                              "auto b = exponential(x) + std::sqrt(y) + log_.exp(z) + arcsin(x);\n",
-    "tests/helper.h": '// H.\n#pragma once\n#include "tools/a.h"\n#include <gtest/gtest.h>\n',
+    "tests/helper.h": '// H.\n#pragma once\n#include "tools/arguments/a.h"\n#include <gtest/gtest.h>\n',
     "perf/a.cpp": '#include "tests/helper.h"\n#include <benchmark/benchmark.h>\n'
                   "#include <tbb/flow_graph.h>\n",
     "docs/a.md": "text\n",
+    "tools/main.cpp": '#include "tools/commands/a.h"\n#include "tools/arguments/a.h"\n',
+    "tools/commands/a.h": '// A.\n#pragma once\n#include "tools/arguments/a.h"\n',
     "build/formats/a.h": "no header of ours\n",
     "tests/__pycache__/a.h": "no header of ours\n",
     # Names that are no second definition: a declaration, a private class, an overload, another
     # namespace, a member, a text, a comment, unnamed namespaces of two layers, a test's own.
-    "stages/names.h": "// N.\n#pragma once\nnamespace qmpipe {\nclass Store;\n"
+    "stages/posts/names.h": "// N.\n#pragma once\nnamespace qmpipe {\nclass Store;\n"
                       "struct Post { int i; };\ninline constexpr int kWide = 1;\n"
                       "inline int size_of(const Post& p) { return p.i; }\n"
                       "template <class T>\nclass Cache { struct Impl; };\n}  // namespace qmpipe\n",
-    "stages/store.h": "// S.\n#pragma once\nnamespace qmpipe {\nclass Post;\n"
+    "stages/posts/store.h": "// S.\n#pragma once\nnamespace qmpipe {\nclass Post;\n"
                       "class Store { struct Post {}; };\ninline int size_of(int p) { return p; }\n"
                       "namespace detail { struct Post {}; }\n}  // namespace qmpipe\n",
-    "stages/store.cpp": '#include "stages/store.h"\n'
+    "stages/posts/store.cpp": '#include "stages/posts/store.h"\n'
                         "namespace fs = std::filesystem;\nnamespace qmpipe {\nnamespace {\n"
                         "struct Entry { int k; };  // struct Post {\n"
                         'const char* const kText = "struct Post { int i; };";\n}\n'
                         "struct Store::Impl { int Post = 1; };\nclass Own {};\n}\n",
-    "stages/names.cpp": '#include "stages/names.h"\n'
+    "stages/posts/names.cpp": '#include "stages/posts/names.h"\n'
                         "namespace fs = std::filesystem;\nnamespace qmpipe {\nnamespace {\n"
                         "using Number = long;\n}\nint f() { struct Post {}; return 0; }\n}\n",
-    "pipeline/names.cpp": "namespace qmpipe {\nnamespace {\nstruct Entry { long k; };\n"
+    "pipeline/common/names.cpp": "namespace qmpipe {\nnamespace {\nstruct Entry { long k; };\n"
                           "int f() try {\n  return 1;\n} catch (int) {\n  return 0;\n}\n}\n}\n",
-    "pipeline/tries.cpp": "namespace qmpipe {\nnamespace {\n"
+    "pipeline/common/tries.cpp": "namespace qmpipe {\nnamespace {\n"
                           "int g() try {\n  return 1;\n} catch (int) {\n  return 0;\n}\n}\n}\n",
     "tests/names_test.cpp": "namespace qmpipe {\nnamespace {\nstruct Post { int x; };\n}\n}\n",
 }
@@ -226,59 +265,64 @@ GOOD_TREE = {
 HEADER = "// H.\n#pragma once\n"
 # (file, its text, what the violation must say)
 FAULTS = [
-    ("scheduler/b.cpp", '#include "formats/a.h"\n', "includes point one way"),
-    ("formats/b.h", HEADER + '#include "stages/a.h"\n', "formats/b.h:3: formats/ includes"),
-    ("stages/b.cpp", '#include "pipeline/a.h"\n', "includes point one way"),
-    ("pipeline/b.cpp", '#  include "tools/a.h"\n', "includes point one way"),
-    ("tools/b.cpp", '#include "tests/helper.h"\n', "nothing includes tests/"),
-    ("formats/b.cpp", '#include "a.h"\n', "not a path from the repository's root"),
-    ("formats/b.cpp", '#include "fmt/format.h"\n', "not a path from the repository's root"),
+    ("scheduler/b.cpp", '#include "formats/bytes/a.h"\n', "includes point one way"),
+    ("formats/bytes/b.h", HEADER + '#include "stages/posts/a.h"\n', "formats/bytes/b.h:3: formats/ includes"),
+    ("stages/posts/b.cpp", '#include "pipeline/common/a.h"\n', "includes point one way"),
+    ("pipeline/common/b.cpp", '#  include "tools/arguments/a.h"\n', "includes point one way"),
+    ("tools/arguments/b.cpp", '#include "tests/helper.h"\n', "nothing includes tests/"),
+    ("formats/bytes/b.cpp", '#include "formats/crs/a.h"\n',
+     'formats/bytes/ includes "formats/crs/a.h": rooms may include those before them'),
+    ("formats/b.cpp", "int x;\n", "formats/b.cpp: in no room of formats/"),
+    ("formats/bites/b.cpp", "int x;\n", "in no room of formats/"),
+    ("formats/bytes/more/b.cpp", "int x;\n", "in no room of formats/"),
+    ("formats/bytes/b.cpp", '#include "a.h"\n', "not a path from the repository's root"),
+    ("formats/bytes/b.cpp", '#include "fmt/format.h"\n', "not a path from the repository's root"),
     ("scheduler/b.cpp", "#include <tbb/concurrent_queue.h>\n", "TBB belongs to pipeline/"),
-    ("stages/b.cpp", "#include <oneapi/tbb.h>\n", "TBB belongs to pipeline/"),
-    ("pipeline/b.cpp", "#include <gdal_priv.h>\n", "GDAL belongs to formats/"),
-    ("tools/b.cpp", "#include <ogr_spatialref.h>\n", "GDAL belongs to formats/"),
-    ("tools/b.cpp", "#include <cpl_conv.h>\n", "GDAL belongs to formats/"),
-    ("stages/b.cpp", "#include <hdf5.h>\n", "HDF5 belongs to formats/"),
-    ("pipeline/b.cpp", "#include <sqlite3.h>\n", "SQLite belongs to formats/"),
-    ("pipeline/b.cpp", "#include <zstd.h>\n", "zstd belongs to formats/"),
-    ("stages/b.cpp", "#include <libdeflate.h>\n", "libdeflate belongs to formats/ and pipeline/"),
-    ("stages/b.cpp", "#include <nlohmann/json.hpp>\n", "nlohmann-json belongs to"),
-    ("formats/b.cpp", "#include <CGAL/Epick.h>\n", "CGAL belongs to stages/"),
-    ("pipeline/b.cpp", "#include <CLI/CLI.hpp>\n", "CLI11 belongs to tools/"),
-    ("formats/b.cpp", "#include <gtest/gtest.h>\n", "GoogleTest belongs to tests/ and perf/"),
-    ("formats/b.cpp", "#include <Eigen/Dense>\n", "a new dependency"),
-    ("stages/b.h", HEADER + "#include <fmt/format.h>\n", "our headers include ours"),
-    ("formats/b.h", HEADER + "#include <gdal_priv.h>\n", "our headers include ours"),
+    ("stages/posts/b.cpp", "#include <oneapi/tbb.h>\n", "TBB belongs to pipeline/"),
+    ("pipeline/common/b.cpp", "#include <gdal_priv.h>\n", "GDAL belongs to formats/"),
+    ("tools/arguments/b.cpp", "#include <ogr_spatialref.h>\n", "GDAL belongs to formats/"),
+    ("tools/arguments/b.cpp", "#include <cpl_conv.h>\n", "GDAL belongs to formats/"),
+    ("stages/posts/b.cpp", "#include <hdf5.h>\n", "HDF5 belongs to formats/"),
+    ("pipeline/common/b.cpp", "#include <sqlite3.h>\n", "SQLite belongs to formats/"),
+    ("pipeline/common/b.cpp", "#include <zstd.h>\n", "zstd belongs to formats/"),
+    ("stages/posts/b.cpp", "#include <libdeflate.h>\n", "libdeflate belongs to formats/ and pipeline/"),
+    ("stages/posts/b.cpp", "#include <nlohmann/json.hpp>\n", "nlohmann-json belongs to"),
+    ("formats/bytes/b.cpp", "#include <CGAL/Epick.h>\n", "CGAL belongs to stages/"),
+    ("pipeline/common/b.cpp", "#include <CLI/CLI.hpp>\n", "CLI11 belongs to tools/"),
+    ("formats/bytes/b.cpp", "#include <gtest/gtest.h>\n", "GoogleTest belongs to tests/ and perf/"),
+    ("formats/bytes/b.cpp", "#include <Eigen/Dense>\n", "a new dependency"),
+    ("stages/posts/b.h", HEADER + "#include <fmt/format.h>\n", "our headers include ours"),
+    ("formats/bytes/b.h", HEADER + "#include <gdal_priv.h>\n", "our headers include ours"),
     ("scheduler/b.h", "// No guard.\n", "has #pragma once"),
     ("scheduler/b.h", "#pragma once\n// Late.\n", "opens with a comment"),
     ("scheduler/b.h", "#pragma once", "opens with a comment"),
     ("scheduler/b.hpp", HEADER, "are called .h and .cpp"),
-    ("stages/b.cpp", "int x;\n" * 601, "601 lines"),
+    ("stages/posts/b.cpp", "int x;\n" * 601, "601 lines"),
     ("tests/b.py", "x = 1\n" * 601, "601 lines"),
-    ("stages/b.cpp", "double x = std::sin(y);\n", "stages/b.cpp:1: std::sin: its last bits"),
-    ("formats/b.h", HEADER + "inline double f(double y) { return 2*pow(y, 2); }\n", "last bits"),
+    ("stages/posts/b.cpp", "double x = std::sin(y);\n", "stages/posts/b.cpp:1: std::sin: its last bits"),
+    ("formats/bytes/b.h", HEADER + "inline double f(double y) { return 2*pow(y, 2); }\n", "last bits"),
     ("scheduler/b.cpp", "double x = std::hypot (y, z);\n", "last bits"),
-    ("pipeline/b.cpp", "std::normal_distribution<double> x;\n", "last bits"),
-    ("stages/names.cpp", '#include <vector>\n#include "stages/names.h"\n',
-     "stages/names.cpp:1: the first include is its own header, \"stages/names.h\""),
-    ("stages/names.cpp", "int x;\n", "the first include is its own header"),
+    ("pipeline/common/b.cpp", "std::normal_distribution<double> x;\n", "last bits"),
+    ("stages/posts/names.cpp", '#include <vector>\n#include "stages/posts/names.h"\n',
+     "stages/posts/names.cpp:1: the first include is its own header, \"stages/posts/names.h\""),
+    ("stages/posts/names.cpp", "int x;\n", "the first include is its own header"),
     ("src/b.cpp", "int x;\n", "src/: not one of the folders"),
-    ("tools/b.h", HEADER + "namespace qmpipe {\nstruct Post {\n  int x;\n};\n}\n",
-     "tools/b.h:4: qmpipe::Post is defined in stages/names.h:5 too"),
-    ("tools/b.h", HEADER + "namespace qmpipe {\nenum class Post : int { kA };\n}\n", "Post is"),
-    ("tools/b.h", HEADER + "namespace qmpipe {\nusing Post = int;\n}\n", "Post is defined"),
-    ("tools/b.h", HEADER + "namespace qmpipe {\ntemplate <class T, int N = (1 < 2)>\n"
+    ("tools/arguments/b.h", HEADER + "namespace qmpipe {\nstruct Post {\n  int x;\n};\n}\n",
+     "tools/arguments/b.h:4: qmpipe::Post is defined in stages/posts/names.h:5 too"),
+    ("tools/arguments/b.h", HEADER + "namespace qmpipe {\nenum class Post : int { kA };\n}\n", "Post is"),
+    ("tools/arguments/b.h", HEADER + "namespace qmpipe {\nusing Post = int;\n}\n", "Post is defined"),
+    ("tools/arguments/b.h", HEADER + "namespace qmpipe {\ntemplate <class T, int N = (1 < 2)>\n"
                            "class Cache final : public Base<T> {\n};\n}\n", "Cache is defined"),
-    ("tools/b.h", HEADER + "namespace qmpipe {\ninline constexpr long kWide{2};\n}\n", "kWide is"),
-    ("tools/b.h", HEADER + "namespace qmpipe {\ninline long size_of(const Post& q) {\n}\n}\n",
+    ("tools/arguments/b.h", HEADER + "namespace qmpipe {\ninline constexpr long kWide{2};\n}\n", "kWide is"),
+    ("tools/arguments/b.h", HEADER + "namespace qmpipe {\ninline long size_of(const Post& q) {\n}\n}\n",
      "size_of is defined"),
-    ("stages/b.cpp", "namespace qmpipe {\nnamespace {\nstruct Post {};\n}\n}\n",
-     "stages/b.cpp:3: qmpipe::Post is defined in stages/names.h:5 too"),
+    ("stages/posts/b.cpp", "namespace qmpipe {\nnamespace {\nstruct Post {};\n}\n}\n",
+     "stages/posts/b.cpp:3: qmpipe::Post is defined in stages/posts/names.h:5 too"),
     ("tests/b.cpp", "namespace qmpipe {\nstruct Post {};\n}\n", "Post is defined"),
-    ("stages/z.cpp", "namespace qmpipe {\nnamespace {\nclass Entry {};\n}\n}\n",
-     "stages/z.cpp:3: qmpipe::Entry is defined in stages/store.cpp:5 too, in an unnamed"),
+    ("stages/posts/z.cpp", "namespace qmpipe {\nnamespace {\nclass Entry {};\n}\n}\n",
+     "stages/posts/z.cpp:3: qmpipe::Entry is defined in stages/posts/store.cpp:5 too, in an unnamed"),
     # `Entry` is not the linker's in the others; `Own` is.
-    ("stages/z.cpp", "namespace qmpipe {\nstruct Entry {};\nclass Own {};\n}\n", "Own is defined"),
+    ("stages/posts/z.cpp", "namespace qmpipe {\nstruct Entry {};\nclass Own {};\n}\n", "Own is defined"),
 ]
 
 
@@ -304,7 +348,7 @@ def self_test():
         violations, _ = found_in({**GOOD_TREE, name: text})
         if len(violations) != 1 or expected not in violations[0]:
             failures.append(f"{name} with {text[:60]!r}: expected '{expected}', got {violations}")
-    violations, warnings = found_in({**GOOD_TREE, "stages/b.cpp": "int x;\n" * 401})
+    violations, warnings = found_in({**GOOD_TREE, "stages/posts/b.cpp": "int x;\n" * 401})
     if violations or len(warnings) != 1:
         failures.append("401 lines are a warning and not a violation")
     for failure in failures:

@@ -13,6 +13,7 @@
 #include "formats/pmtiles/directory.h"
 #include "formats/pmtiles/id.h"
 #include "formats/tile/layer_json.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "tests/temporary_folder.h"
 
 namespace qmpipe {

@@ -1,4 +1,4 @@
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -12,6 +12,7 @@
 #include "formats/tile/layer_json.h"
 #include "formats/tile/tile_path.h"
 #include "formats/tile_sets/folder_sink.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "stages/finish/mesh_order.h"
 #include "stages/finish/normals.h"
 #include "stages/finish/quantize.h"

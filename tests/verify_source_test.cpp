@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "formats/bytes/errors.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "pipeline/build/build.h"
 #include "pipeline/verify/verify.h"
 #include "tests/raster_fixture.h"

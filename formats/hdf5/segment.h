@@ -1,4 +1,5 @@
-// What all HDF5 files of ours have in common (formats/run_store/lattice_segment.h, formats/run_store/border_segment.h, formats/detail_model/file.h).
+// What all HDF5 files of ours have in common (formats/run_store/lattice_segment.h and
+// border_segment.h there, formats/detail_model/file.h).
 //
 // A file is built in memory, so that only our own code meets a full disk, and ends with a seal
 // (formats/bytes/seal.h), which HDF5 ignores. Root attributes `format_version` (int32) and a text

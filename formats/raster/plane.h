@@ -7,7 +7,7 @@
 
 #include "formats/raster/crs.h"
 #include "formats/raster/grid.h"
-#include "formats/sources/raster_source.h"
+#include "formats/raster/info.h"
 
 class GDALDataset;
 

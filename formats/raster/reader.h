@@ -12,7 +12,7 @@
 #include <span>
 
 #include "formats/raster/block_cache.h"
-#include "formats/sources/raster_source.h"
+#include "formats/raster/info.h"
 
 class GDALRasterBand;
 

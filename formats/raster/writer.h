@@ -7,7 +7,7 @@
 #include <memory>
 #include <span>
 
-#include "formats/sources/raster_source.h"
+#include "formats/raster/grid.h"
 #include "scheduler/tiling_scheme.h"
 
 namespace qmpipe {

@@ -1,9 +1,8 @@
-// Reading a finished tile set back, ours or another program's.
+// A finished tile set as its readers see it, ours or another program's, whatever its form.
 // const use is safe from several threads.
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -31,16 +30,6 @@ class TileSet {
   virtual Result<std::vector<std::uint8_t>> read(const TileKey& key) const = 0;
   virtual Result<std::int64_t> stored_bytes(const TileKey& key) const = 0;
 };
-
-// `path`: the set's folder, the layer.json in it, or a file that holds the set (told by its
-// extension, else by its first bytes). Throws IoError when it cannot be opened as a tile set: not
-// there, no such file, neither a layer.json nor a tile in the folder, or a folder of it that cannot
-// be listed.
-std::unique_ptr<TileSet> open_tile_set(const std::filesystem::path& path);
-
-// A folder, a layer.json or a file that holds a set, to be told from a single tile's file. Looks no
-// further than open_tile_set() does before it decides.
-bool is_tile_set(const std::filesystem::path& path);
 
 // A tile's bytes without gzip, where there was any; refuses what would exceed 256 MiB.
 Result<std::vector<std::uint8_t>> plain_tile_bytes(std::vector<std::uint8_t> stored);

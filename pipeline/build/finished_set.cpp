@@ -7,7 +7,7 @@
 
 #include "formats/bytes/file_bytes.h"
 #include "formats/mbtiles/set.h"
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "formats/tile_sets/tile_output.h"
 #include "pipeline/recipe/fingerprint.h"
 

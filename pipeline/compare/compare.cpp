@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "formats/bytes/errors.h"
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "pipeline/build/forecast.h"
 #include "pipeline/common/stopwatch.h"
 #include "pipeline/verify/source.h"

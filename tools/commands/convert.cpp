@@ -16,7 +16,7 @@
 #include "formats/bytes/errors.h"
 #include "formats/bytes/printable.h"
 #include "formats/mbtiles/mbtiles.h"
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "pipeline/common/machine_share.h"
 #include "pipeline/convert/convert.h"
 #include "pipeline/run/progress.h"

@@ -8,7 +8,7 @@
 
 #include "formats/bytes/errors.h"
 #include "formats/tile/tile_path.h"
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "tools/arguments/help_format.h"
 #include "tools/commands/info_report.h"
 

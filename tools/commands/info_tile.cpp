@@ -13,7 +13,7 @@
 #include "formats/tile/oct_normal.h"
 #include "formats/tile/quantized_mesh.h"
 #include "formats/tile/tile_path.h"
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "stages/surface/geodesy.h"
 #include "tools/commands/info_report.h"
 

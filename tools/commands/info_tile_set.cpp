@@ -9,7 +9,7 @@
 
 #include "formats/bytes/printable.h"
 #include "formats/tile/layer_json.h"
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "tools/commands/info_report.h"
 
 namespace qmpipe {

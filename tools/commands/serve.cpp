@@ -16,7 +16,7 @@
 #include "formats/bytes/errors.h"
 #include "formats/bytes/file_bytes.h"
 #include "formats/bytes/printable.h"
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "tools/arguments/help_format.h"
 #include "tools/arguments/interrupt.h"
 #include "tools/arguments/printed_streams.h"

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "formats/tile/tile_set.h"
+#include "formats/tile_sets/open_tile_set.h"
 #include "pipeline/common/machine_share.h"
 #include "pipeline/run/progress.h"
 #include "pipeline/verify/verify.h"
