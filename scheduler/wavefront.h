@@ -1,9 +1,10 @@
 // The order in which tiles are built, as a pure function of which tiles there are.
 //
-// Colours by parity (DESIGN 5.3): a common side is owned by the tile of the lower colour, the other
-// inherits its border. So a tile of colour 0 waits for nobody, 1 for its west and east neighbours,
-// 2 for south and north, 3 for all four; the longest chain is 0 -> 1 or 2 -> 3. Tiles that meet only
-// in a corner owe each other nothing, since corners are always vertices.
+// Colours by parity (docs/decisions/0002-four-colours.md): a common side is owned by the tile of
+// the lower colour, the other inherits its border. So a tile of colour 0 waits for nobody, 1 for
+// its west and east neighbours, 2 for south and north, 3 for all four; the longest chain is 0 -> 1
+// or 2 -> 3. Tiles that meet only in a corner owe each other nothing, since corners are always
+// vertices.
 //
 // Guarantees of a plan: every tile stands in it exactly once; every tile stands after all tiles it
 // waits for; tiles of one colour share no side (across the antimeridian too); who owns which side

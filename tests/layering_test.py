@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds the layout rules of the repository by reading its files (DESIGN 2, CONVENTIONS 2).
+"""Holds the layout rules of the repository by reading its files (CONTRIBUTING, "Where things go").
 
 Checked: includes point one way (scheduler <- formats <- stages <- pipeline <- tools, and within a layer
 by the table of its rooms; tests and perf may include anything); each third-party library is included only where the table below allows it,
@@ -189,7 +189,7 @@ def check_tree(root):
     sources = {}
     for folder in sorted(p.name for p in root.iterdir() if p.is_dir()):
         if folder not in ALLOWED_FOLDERS | IGNORED_FOLDERS:
-            violations.append(f"{folder}/: not one of the folders of DESIGN 2")
+            violations.append(f"{folder}/: not one of the folders that CONTRIBUTING names")
     for absolute in project_files(root):
         path = absolute.relative_to(root)
         # What a test preloads into the program is C: the functions that it replaces are.

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Nothing is lost: builds that are killed, stopped, starved of disk or tampered with either go on and
-end with the bytes of an uninterrupted build, or say what is wrong (DESIGN 4.7, 5.7).
+end with the bytes of an uninterrupted build, or say what is wrong.
 
 usage: resume_test.py QMPIPE [unittest's arguments]
 QMPIPE_RESUME_SEED repeats the random moments of an earlier run; QMPIPE_RESUME_KILLS sets how many.

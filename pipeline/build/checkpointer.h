@@ -1,5 +1,6 @@
 // Writes checkpoints while tiles go on: what is in the sink is synced, the borders that later tiles
-// need are sealed, and only then the run's record counts the tiles (DESIGN 5.7).
+// need are sealed, and only then does the run's record count the tiles
+// (docs/decisions/0004-checkpoints-count-a-prefix.md).
 #pragma once
 
 #include <chrono>

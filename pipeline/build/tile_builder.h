@@ -1,5 +1,5 @@
-// One tile's way through the stages (DESIGN 3, steps 2 to 5): window, mesh, finish, encode. What the
-// graph's nodes call, one function a node; each is pure but for the clock.
+// One tile's way through the stages: window, mesh, finish, encode. What the graph's nodes call, one
+// function a node; each is pure but for the clock.
 //
 // const use is safe from several threads.
 #pragma once

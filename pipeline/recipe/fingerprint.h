@@ -1,5 +1,5 @@
-// What decides a run's bytes, as text: the first line of its journal. A run may go on with what
-// another one has left only when both have the same (DESIGN 5.7).
+// What decides a run's bytes, as text: the first line of its journal. A run may continue what another
+// one has left only when both have the same (docs/decisions/0004-checkpoints-count-a-prefix.md).
 //
 // Threads, memory and what layer.json says about the set (name, description, attribution) are not in
 // it: no tile depends on them.

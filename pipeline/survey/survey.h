@@ -1,5 +1,5 @@
 // The first pass over the source: samples the posts of the sampling zoom, reduces them 2:1 down to
-// zoom 0, and learns which tiles have data and how high they are (DESIGN 3).
+// zoom 0, and learns which tiles have data and how high they are.
 //
 // With a record, a zoom on disk is written down there when it is done, and one that an earlier run
 // has done is not done again; of one that it was at, only the blocks that are missing.

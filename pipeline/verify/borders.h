@@ -1,4 +1,5 @@
-// Cracks between neighbours: what two tiles say about their common side (DESIGN 4, point 2).
+// Cracks between neighbours: what two tiles say about their common side: the second
+// promise of docs/decisions/0010-what-verify-promises.md.
 //
 // A tile's borders are kept without its mesh: a few bytes for each vertex on a side. They are taken
 // from the vertices themselves, not from the side lists, because the vertices are what is drawn.

@@ -1,4 +1,4 @@
-// layer.json against the files (DESIGN 4, point 6).
+// layer.json against the files: the sixth promise of docs/decisions/0010-what-verify-promises.md.
 //
 // Guarantees: the listing is compared exactly, in both directions, without walking the listed
 // rectangles tile by tile: a layer.json that lists the whole globe at zoom 22 costs no more than the

@@ -1,4 +1,5 @@
-// The faults of one tile, looked at alone (DESIGN 4, points 4 and 5).
+// The faults of one tile, looked at alone: the fourth and fifth promise of
+// docs/decisions/0010-what-verify-promises.md.
 //
 // Guarantees: whatever the bytes, it ends with findings and never crashes. At most one finding for
 // each kind (and side), which says how many places have the fault and names the first. A fault that

@@ -1,5 +1,5 @@
-// Is a finished tile set right? DESIGN 4, points 2 to 6, on any quantized-mesh set, ours or another
-// program's.
+// Is a finished tile set right? Any quantized-mesh set, ours or another program's, held to the
+// promises two to six of docs/decisions/0010-what-verify-promises.md.
 //
 // Guarantees: whatever the files hold, it ends with a report. The report depends on the set and the
 // source alone, not on threads. Memory does not grow with the set beyond its keys: tiles are read

@@ -2,9 +2,9 @@
 //
 // A vertex at height k * step is stored as (k - k_min) * m, where m is the largest integer with
 // 32767 * step / m >= the tile's height range, and the header says min = k_min * step, which is the
-// largest multiple of the sides' step that is not above the lowest vertex, and
-// max = min + 32767 * step / m (DESIGN 5.4). The header's minimum is exact; rounding its maximum to
-// float32 moves no vertex by more than 0.5 mm: above 16 km m and k_min are chosen so.
+// largest multiple of the sides' step that is not above the lowest vertex, and max = min + 32767 *
+// step / m (docs/decisions/0003-height-steps.md). The header's minimum is exact; rounding its
+// maximum to float32 moves no vertex by more than 0.5 mm: above 16 km m and k_min are chosen so.
 #pragma once
 
 #include "formats/tile/quantized_mesh.h"

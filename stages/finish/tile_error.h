@@ -1,5 +1,6 @@
 // The vertical error of a decoded tile against its zoom's posts, and of a TIN against those it was
-// made from: the measure of DESIGN 4.3.
+// made from: what a tolerance is held to (docs/decisions/0010-what-verify-promises.md, the third
+// promise).
 //
 // A post that is a vertex is judged where the file puts the vertex (half a quantized unit from its
 // exact place at most); every other post at its exact place on the surface. That is what a tolerance

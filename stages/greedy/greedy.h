@@ -22,7 +22,7 @@ namespace qmpipe {
 struct GreedyOptions {
   // The zoom's tolerance g(z), the paper's g_e. REQUIRES: > height_steps.side_m / 2.
   double tolerance_m = 0;
-  // Vertex heights are multiples of this (DESIGN 5.4).
+  // Vertex heights are multiples of this (stages/posts/height_step.h).
   HeightSteps height_steps = {};
   // How deep a chord of a free side may sink below the globe.
   double side_depth_m = std::numeric_limits<double>::infinity();

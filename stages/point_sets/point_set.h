@@ -29,7 +29,7 @@ enum class PointSetMethod {
 
 struct PointSetOptions {
   PointSetMethod method = PointSetMethod::kRandom;
-  // Vertex heights are multiples of this (DESIGN 5.4).
+  // Vertex heights are multiples of this (stages/posts/height_step.h).
   HeightSteps height_steps = {};
   // How deep a chord of a free side may sink below the globe.
   double side_depth_m = std::numeric_limits<double>::infinity();

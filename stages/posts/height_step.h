@@ -1,5 +1,5 @@
 // The height steps of a zoom and of its tiles: all vertex heights are multiples of them, so that a
-// vertex on a common side decodes to the same height in both tiles (DESIGN 5.4).
+// vertex on a common side decodes to the same height in both tiles (docs/decisions/0003-height-steps.md).
 //
 // Vertices on sides take the zoom's step. Those inside a tile may take a part of it, which the tile
 // chooses by its own range, so that a zoom with one mountain does not coarsen its plains.

@@ -1,4 +1,4 @@
-// Going one zoom coarser: 2:1 reduction of the lattice over valid posts (DESIGN 5.2).
+// Going one zoom coarser: 2:1 reduction of the lattice over valid posts.
 #pragma once
 
 #include <span>

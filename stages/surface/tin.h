@@ -21,8 +21,8 @@ struct TinVertex {
   // The post that this vertex is, or kNoPost for one that a method has put between posts. Vertices
   // on the sides are always posts.
   std::int32_t post = kNoPost;
-  // A multiple of the tile's height step (DESIGN 5.4); on a side of the zoom's, so that neighbours
-  // decode common vertices alike.
+  // A multiple of the tile's height step (stages/posts/height_step.h); on a side of the zoom's, so
+  // that neighbours decode common vertices alike.
   double height_m = 0;
   friend bool operator==(const TinVertex&, const TinVertex&) = default;
 };
