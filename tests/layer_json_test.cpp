@@ -9,9 +9,15 @@
 namespace qmpipe {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::Field;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+
+auto complaint_of(LayerFlaw flaw, const char* part) {
+  return AllOf(Field(&LayerComplaint::flaw, flaw), Field(&LayerComplaint::text, HasSubstr(part)));
+}
 
 LayerJson example() {
   LayerJson layer;
@@ -97,21 +103,24 @@ TEST(LayerJson, OtherProgramsSetsAreReadWithComplaints) {
   EXPECT_EQ(parsed->scheme, "tms");
   EXPECT_EQ(parsed->layer.max_zoom, 0);
   EXPECT_EQ(parsed->layer.available[1].size(), 2U);
-  const std::vector<std::string>& complaints = parsed->complaints;
-  EXPECT_THAT(complaints, Contains(HasSubstr("\"schema\" stands where \"scheme\"")));
-  EXPECT_THAT(complaints, Contains(HasSubstr("no \"format\"")));
-  EXPECT_THAT(complaints, Contains(HasSubstr("no \"version\"")));
-  EXPECT_THAT(complaints, Contains(HasSubstr("no \"bounds\"")));
-  EXPECT_THAT(complaints, Contains(HasSubstr("2 ranges of zoom 1 are reversed or outside")));
-  EXPECT_THAT(complaints, Contains(HasSubstr("\"maxzoom\" is 0, but")));
+  const std::vector<LayerComplaint>& complaints = parsed->complaints;
+  EXPECT_THAT(complaints, Contains(complaint_of(LayerFlaw::kSchemaForScheme,
+                                                "\"schema\" stands where \"scheme\"")));
+  EXPECT_THAT(complaints, Contains(complaint_of(LayerFlaw::kNoFormat, "no \"format\"")));
+  EXPECT_THAT(complaints, Contains(complaint_of(LayerFlaw::kNoVersion, "no \"version\"")));
+  EXPECT_THAT(complaints, Contains(complaint_of(LayerFlaw::kNoBounds, "no \"bounds\"")));
+  EXPECT_THAT(complaints, Contains(complaint_of(LayerFlaw::kRanges,
+                                                "2 ranges of zoom 1 are reversed or outside")));
+  EXPECT_THAT(complaints, Contains(complaint_of(LayerFlaw::kDeepestZoom, "\"maxzoom\" is 0, but")));
 }
 
 TEST(LayerJson, AnEmptyObjectIsReadWithComplaints) {
   const auto parsed = parse_layer_json("{}");
   ASSERT_TRUE(parsed.ok());
-  EXPECT_THAT(parsed->complaints, Contains(HasSubstr("no \"tiles\"")));
-  EXPECT_THAT(parsed->complaints, Contains(HasSubstr("shows no tile")));
-  EXPECT_THAT(parsed->complaints, Contains(HasSubstr("no \"maxzoom\"")));
+  EXPECT_THAT(parsed->complaints, Contains(complaint_of(LayerFlaw::kNoTiles, "no \"tiles\"")));
+  EXPECT_THAT(parsed->complaints,
+              Contains(complaint_of(LayerFlaw::kNoAvailability, "shows no tile")));
+  EXPECT_THAT(parsed->complaints, Contains(complaint_of(LayerFlaw::kNoMaxZoom, "no \"maxzoom\"")));
   EXPECT_FALSE(parsed->metadata_availability.has_value());
 }
 

@@ -58,6 +58,30 @@ RectangleDeg bounds_of_deepest(std::span<const TileKey> keys, const TilingScheme
 // REQUIRES: finite bounds; qmpipe_json empty or a JSON object.
 std::string write_layer_json(const LayerJson& layer);
 
+// What may be the matter with a layer.json that can be read.
+enum class LayerFlaw : std::uint8_t {
+  kNoTiles,
+  kNoVersion,
+  kNoFormat,
+  kOtherFormat,
+  kSchemaForScheme,
+  kOtherScheme,
+  kNoBounds,
+  kBounds,
+  kRanges,
+  kZooms,
+  kNoMaxZoom,
+  kDeepestZoom,
+  kMetadataLevels,
+  kNoAvailability,
+  kParentSet,
+};
+
+struct LayerComplaint {
+  LayerFlaw flaw{};
+  std::string text;  // a sentence without a full stop
+};
+
 // Tolerant of other programs' sets (unknown keys, missing optional keys, "schema" for "scheme"), so
 // that they can be examined; what it had to tolerate is listed in `complaints`. Refuses what is no
 // JSON object, has ill-typed known keys, an unknown projection or nests deeper than 64 levels.
@@ -68,7 +92,9 @@ struct ParsedLayerJson {
   std::string scheme;
   bool has_max_zoom = false;  // where not, layer.max_zoom is the deepest zoom of `available`
   std::optional<std::int32_t> metadata_availability;
-  std::vector<std::string> complaints;
+  std::vector<LayerComplaint> complaints;
+
+  bool has(LayerFlaw flaw) const;
 };
 Result<ParsedLayerJson> parse_layer_json(const std::string& text);
 

@@ -81,7 +81,8 @@ class LayerParser {
     read_projection();
     layer.extensions = texts("extensions");
     layer.tile_urls = texts("tiles");
-    if (layer.tile_urls.empty()) complain("no \"tiles\": clients cannot build a tile's address");
+    if (layer.tile_urls.empty())
+      complain(LayerFlaw::kNoTiles, "no \"tiles\": clients cannot build a tile's address");
     read_bounds();
     read_available();
     read_zooms();
@@ -98,7 +99,9 @@ class LayerParser {
   void fail(const std::string& fault) {
     if (fault_.empty()) fault_ = fault;
   }
-  void complain(std::string complaint) { parsed_.complaints.push_back(std::move(complaint)); }
+  void complain(LayerFlaw flaw, std::string text) {
+    parsed_.complaints.push_back({.flaw = flaw, .text = std::move(text)});
+  }
 
   std::string as_text(const Json& value, const std::string& name) {
     if (value.is_string()) return value.get<std::string>();
@@ -133,26 +136,28 @@ class LayerParser {
   }
 
   void read_version() {
-    if (find("version") == nullptr) complain("no \"version\"");
+    if (find("version") == nullptr) complain(LayerFlaw::kNoVersion, "no \"version\"");
     parsed_.layer.version = text("version", "");
   }
 
   void read_format_and_scheme() {
     parsed_.format = text("format", "");
     if (find("format") == nullptr) {
-      complain("no \"format\": CesiumJS refuses the set");
+      complain(LayerFlaw::kNoFormat, "no \"format\": CesiumJS refuses the set");
     } else if (!parsed_.format.starts_with("quantized-mesh-1.")) {
-      complain(fmt::format("the format is \"{}\", not \"quantized-mesh-1.0\"", parsed_.format));
+      complain(LayerFlaw::kOtherFormat,
+               fmt::format("the format is \"{}\", not \"quantized-mesh-1.0\"", parsed_.format));
     }
     parsed_.scheme = text("scheme", "");
     if (find("scheme") == nullptr && find("schema") != nullptr) {
       parsed_.scheme = text("schema", "");
-      complain("\"schema\" stands where \"scheme\" is meant");
+      complain(LayerFlaw::kSchemaForScheme, "\"schema\" stands where \"scheme\" is meant");
     }
     if (parsed_.scheme.empty()) {
       parsed_.scheme = "tms";
     } else if (parsed_.scheme != "tms") {
-      complain(fmt::format("the scheme is \"{}\"; the specification knows \"tms\" only",
+      complain(LayerFlaw::kOtherScheme,
+               fmt::format("the scheme is \"{}\"; the specification knows \"tms\" only",
                            parsed_.scheme));
     }
   }
@@ -169,7 +174,7 @@ class LayerParser {
 
   void read_bounds() {
     const Json* bounds = find("bounds");
-    if (bounds == nullptr) return complain("no \"bounds\"");
+    if (bounds == nullptr) return complain(LayerFlaw::kNoBounds, "no \"bounds\"");
     if (!bounds->is_array() || bounds->size() != 4 ||
         !std::all_of(bounds->begin(), bounds->end(),
                      [](const Json& value) { return value.is_number(); })) {
@@ -194,7 +199,8 @@ class LayerParser {
         bounds.south_deg <= bounds.north_deg) {
       return;
     }
-    complain(fmt::format("\"bounds\" are {:g}, {:g}, {:g}, {:g}, which is no rectangle in degrees",
+    complain(LayerFlaw::kBounds,
+             fmt::format("\"bounds\" are {:g}, {:g}, {:g}, {:g}, which is no rectangle in degrees",
                          bounds.west_deg, bounds.south_deg, bounds.east_deg, bounds.north_deg));
   }
 
@@ -239,7 +245,8 @@ class LayerParser {
         return !is_in_scheme(range, zoom);
       });
       if (bad > 0) {
-        complain(fmt::format("{} ranges of zoom {} are reversed or outside the tiling scheme", bad,
+        complain(LayerFlaw::kRanges,
+                 fmt::format("{} ranges of zoom {} are reversed or outside the tiling scheme", bad,
                              zoom));
       }
     }
@@ -261,16 +268,17 @@ class LayerParser {
     const std::int32_t lowest = parsed_.layer.min_zoom;
     const std::int32_t highest = parsed_.layer.max_zoom;
     if (lowest < 0 || highest > kDeepest || (parsed_.has_max_zoom && lowest > highest)) {
-      complain(fmt::format("\"minzoom\" {} and \"maxzoom\" {} are no zooms that a set can have",
+      complain(LayerFlaw::kZooms,
+               fmt::format("\"minzoom\" {} and \"maxzoom\" {} are no zooms that a set can have",
                            lowest, highest));
     }
     if (!parsed_.has_max_zoom) {
-      complain("no \"maxzoom\": CesiumJS looks tiles up slowly without it");
+      complain(LayerFlaw::kNoMaxZoom, "no \"maxzoom\": CesiumJS looks tiles up slowly without it");
     } else if (parsed_.layer.max_zoom < deepest) {
-      complain(
-          fmt::format("\"maxzoom\" is {}, but tiles are available down to zoom {}: clients "
-                      "will not show them",
-                      parsed_.layer.max_zoom, deepest));
+      complain(LayerFlaw::kDeepestZoom,
+               fmt::format("\"maxzoom\" is {}, but tiles are available down to zoom {}: clients "
+                           "will not show them",
+                           parsed_.layer.max_zoom, deepest));
     }
   }
 
@@ -278,14 +286,16 @@ class LayerParser {
     if (const Json* levels = find("metadataAvailability")) {
       parsed_.metadata_availability = as_integer(*levels, "metadataAvailability");
       if (*parsed_.metadata_availability > 30) {
-        complain(fmt::format("\"metadataAvailability\" is {}, more levels than there can be",
+        complain(LayerFlaw::kMetadataLevels,
+                 fmt::format("\"metadataAvailability\" is {}, more levels than there can be",
                              *parsed_.metadata_availability));
       }
     } else if (find("available") == nullptr) {
-      complain("neither \"available\" nor \"metadataAvailability\": CesiumJS shows no tile");
+      complain(LayerFlaw::kNoAvailability,
+               "neither \"available\" nor \"metadataAvailability\": CesiumJS shows no tile");
     }
     if (find("parentUrl") != nullptr) {
-      complain("\"parentUrl\" names another set, which is not looked at");
+      complain(LayerFlaw::kParentSet, "\"parentUrl\" names another set, which is not looked at");
     }
     const Json* ours = find("qmpipe");
     if (ours == nullptr) return;
@@ -299,6 +309,11 @@ class LayerParser {
 };
 
 }  // namespace
+
+bool ParsedLayerJson::has(LayerFlaw flaw) const {
+  return std::any_of(complaints.begin(), complaints.end(),
+                     [flaw](const LayerComplaint& complaint) { return complaint.flaw == flaw; });
+}
 
 Result<ParsedLayerJson> parse_layer_json(const std::string& text) {
   SyntaxCheck syntax;

@@ -209,21 +209,15 @@ class Fitter {
     change("\"available\" lists the tiles that are there");
   }
 
-  bool is_complained_of(const char* beginning) const {
-    return std::any_of(
-        parsed_.complaints.begin(), parsed_.complaints.end(),
-        [beginning](const std::string& text) { return text.starts_with(beginning); });
-  }
-
   void fit_bounds() {
-    if (!is_complained_of("\"bounds\" are")) return;
+    if (!parsed_.has(LayerFlaw::kBounds)) return;
     json_.erase("bounds");
     change("\"bounds\" is left out");
   }
 
   void fit_max_zoom() {
     const auto deepest = static_cast<std::int32_t>(zooms_.size()) - 1;
-    const bool is_wrong = is_complained_of("\"minzoom\"");
+    const bool is_wrong = parsed_.has(LayerFlaw::kZooms);
     if (is_wrong) {
       json_.erase("minzoom");
       change("\"minzoom\" is left out");

@@ -174,9 +174,7 @@ class ListingCheck {
     if (!parsed_) return;
     min_zoom_ = std::clamp(parsed_->layer.min_zoom, 0, kMaxZoom + 1);
     lists_tiles_ = !parsed_->metadata_availability.has_value();
-    is_layered_ =
-        std::any_of(parsed_->complaints.begin(), parsed_->complaints.end(),
-                    [](const std::string& text) { return text.starts_with("\"parentUrl\""); });
+    is_layered_ = parsed_->has(LayerFlaw::kParentSet);
   }
 
   std::vector<Finding> run() {
@@ -286,9 +284,9 @@ class ListingCheck {
 };
 
 // What the schema leaves open, or what this program does not follow.
-bool is_advice(const std::string& complaint) {
-  return complaint.starts_with("no \"version\"") || complaint.starts_with("no \"bounds\"") ||
-         complaint.starts_with("\"parentUrl\"");
+bool is_advice(LayerFlaw flaw) {
+  return flaw == LayerFlaw::kNoVersion || flaw == LayerFlaw::kNoBounds ||
+         flaw == LayerFlaw::kParentSet;
 }
 
 }  // namespace
@@ -308,8 +306,9 @@ CheckedLayer check_layer(const TileSet& tile_set) {
     add(FindingKind::kLayerJson, parsed.error().message);
     return layer;
   }
-  for (const std::string& complaint : parsed->complaints) {
-    add(is_advice(complaint) ? FindingKind::kLayerJsonAdvice : FindingKind::kLayerJson, complaint);
+  for (const LayerComplaint& complaint : parsed->complaints) {
+    add(is_advice(complaint.flaw) ? FindingKind::kLayerJsonAdvice : FindingKind::kLayerJson,
+        complaint.text);
   }
   for (const std::string& url : parsed->layer.tile_urls) {
     for (const std::string_view part : {"{z}", "{x}", "{y}"}) {

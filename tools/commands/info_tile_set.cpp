@@ -80,7 +80,9 @@ TileSetFacts facts_of(const TileSet& tiles) {
     const Result<ParsedLayerJson> parsed = parse_layer_json(*text);
     if (parsed) {
       facts.layer = *parsed;
-      facts.complaints = parsed->complaints;
+      for (const LayerComplaint& complaint : parsed->complaints) {
+        facts.complaints.push_back(complaint.text);
+      }
     } else {
       facts.complaints.push_back(parsed.error().message);
     }
