@@ -1,7 +1,6 @@
 #include "tools/commands/build.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -14,6 +13,7 @@
 #include "tools/arguments/method.h"
 #include "tools/arguments/parse_values.h"
 #include "tools/arguments/pyramid.h"
+#include "tools/arguments/terminal.h"
 
 namespace qmpipe {
 namespace {
@@ -30,7 +30,7 @@ struct BuildArguments {
   bool overwrite = false;
   bool keep_run = false;
   bool dry_run = false;
-  bool json = false;
+  bool wants_json = false;
   bool verbose = false;
 };
 
@@ -82,23 +82,22 @@ void print_effective(const BuildOptions& options) {
 int run_build(const BuildArguments& arguments) {
   const BuildOptions options = to_options(arguments);
   if (arguments.verbose) print_effective(options);
-  ProgressStyle style =
-      isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent;
-  if (arguments.json) style = ProgressStyle::kJsonLines;
-  Progress progress(
-      {.style = style, .stop = stop_flag_of_signals(), .shows_buffers = arguments.verbose});
+  Progress progress({.style = progress_style(arguments.wants_json),
+                     .stop = stop_flag_of_signals(),
+                     .shows_buffers = arguments.verbose});
   const BuildResult result = build_pyramid(options, progress);
   std::string text;
   if (result.found) {
-    text = arguments.json
+    text = arguments.wants_json
                ? result.found->report_json
                : fmt::format(
                      "built already: {} tiles in {}, from the same inputs and parameters "
                      "(--overwrite builds them again)\n",
                      result.found->tiles, options.output.path.string());
   } else if (options.run.dry_run) {
-    text = arguments.json ? estimate_json(result.estimate) + "\n" : estimate_text(result.estimate);
-  } else if (arguments.json) {
+    text = arguments.wants_json ? estimate_json(result.estimate) + "\n"
+                                : estimate_text(result.estimate);
+  } else if (arguments.wants_json) {
     text = write_report(result.report);
   } else {
     text = report_table(result.report) +
@@ -153,7 +152,7 @@ void add_output_options(CLI::App& command, BuildArguments& arguments) {
   command.add_flag("--dry-run", arguments.dry_run,
                    "Stop after the estimate: tiles, size, time, memory");
   begin_group(command, kMessagesGroup);
-  command.add_flag("--json", arguments.json,
+  command.add_flag("--json", arguments.wants_json,
                    "Report as JSON on stdout, progress as JSON lines on stderr");
   command.add_flag("-v,--verbose", arguments.verbose,
                    "Print every effective option first, and how full each buffer is meanwhile");

@@ -1,7 +1,6 @@
 #include "tools/commands/compare.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -21,6 +20,7 @@
 #include "tools/arguments/interrupt.h"
 #include "tools/arguments/parse_values.h"
 #include "tools/arguments/pyramid.h"
+#include "tools/arguments/terminal.h"
 
 namespace qmpipe {
 namespace {
@@ -58,7 +58,7 @@ struct CompareArguments {
   std::filesystem::path report;
   bool overwrite = false;
   bool keep_tiles = false;
-  bool json = false;
+  bool wants_json = false;
 };
 
 void write_text(const std::filesystem::path& path, const std::string& text) {
@@ -115,10 +115,7 @@ void write_report_files(const CompareArguments& arguments, const Comparison& com
 int run_compare(const CompareArguments& arguments) {
   require_room(arguments);
   const CompareOptions options = to_options(arguments);
-  ProgressStyle style =
-      isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent;
-  if (arguments.json) style = ProgressStyle::kJsonLines;
-  Progress progress(style, stop_flag_of_signals());
+  Progress progress(progress_style(arguments.wants_json), stop_flag_of_signals());
   make_folders(options.folder);
   const Comparison comparison = compare_methods(options, progress);
   write_report_files(arguments, comparison);
@@ -129,10 +126,11 @@ int run_compare(const CompareArguments& arguments) {
   std::int64_t faults = 0;
   for (const ComparedMethod& method : comparison.methods) faults += method.verify.fault_count;
   const std::string text =
-      arguments.json ? comparison_json(comparison)
-                     : zooms_csv(comparison) + "\n" + run_times_csv(comparison) +
-                           fmt::format("\nreport: {}\n",
-                                       printable_line((arguments.report / "index.html").string()));
+      arguments.wants_json
+          ? comparison_json(comparison)
+          : zooms_csv(comparison) + "\n" + run_times_csv(comparison) +
+                fmt::format("\nreport: {}\n",
+                            printable_line((arguments.report / "index.html").string()));
   std::fputs(text.c_str(), stdout);
   return faults == 0 ? 0 : kExitFaults;
 }
@@ -168,7 +166,7 @@ void register_compare(CLI::App& app, std::function<int()>& action) {
   command->add_flag("--keep-tiles", arguments->keep_tiles,
                     "Leave the pyramids in REPORT/tiles, one folder for each method");
   begin_group(*command, kMessagesGroup);
-  command->add_flag("--json", arguments->json,
+  command->add_flag("--json", arguments->wants_json,
                     "All numbers as JSON on stdout, progress as JSON lines on stderr");
   command->footer(kCompareFooter);
   command->callback(

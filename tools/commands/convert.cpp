@@ -1,7 +1,5 @@
 #include "tools/commands/convert.h"
 
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
@@ -23,6 +21,7 @@
 #include "tools/arguments/help_format.h"
 #include "tools/arguments/interrupt.h"
 #include "tools/arguments/parse_values.h"
+#include "tools/arguments/terminal.h"
 
 namespace qmpipe {
 namespace {
@@ -133,9 +132,7 @@ std::string json_of(const ConvertReport& report, const ConvertOptions& options) 
 int run_convert(const ConvertArguments& arguments) {
   require_sound(arguments);
   const ConvertOptions options = options_of(arguments);
-  const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
-  Progress progress(is_terminal ? ProgressStyle::kTerminal : ProgressStyle::kSilent,
-                    stop_flag_of_signals());
+  Progress progress(progress_style(false), stop_flag_of_signals());
   const std::unique_ptr<TileSet> input = open_input(arguments);
   const ConvertReport report = convert(*input, options, progress);
   const std::string text =

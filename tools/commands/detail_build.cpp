@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -18,6 +17,7 @@
 #include "tools/arguments/help_format.h"
 #include "tools/arguments/interrupt.h"
 #include "tools/arguments/number_options.h"
+#include "tools/arguments/terminal.h"
 #include "tools/commands/detail_commands.h"
 
 namespace qmpipe {
@@ -43,7 +43,7 @@ struct DetailBuildArguments {
   std::string output;
   std::string keep = "20%";
   std::string classes;
-  bool json = false;
+  bool wants_json = false;
 };
 
 double parse_keep(const std::string& text) {
@@ -108,13 +108,11 @@ int run_build(DetailBuildArguments arguments) {
   arguments.options.heights = to_height_options(arguments.heights);
   arguments.options.guard = to_height_guard(arguments.heights);
   require_folder_of(arguments.output, "cannot write the model");
-  ProgressStyle style =
-      ::isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent;
-  Progress progress(style, stop_flag_of_signals());
+  Progress progress(progress_style(false), stop_flag_of_signals());
   const DetailBuilt built = build_detail(arguments.options, progress);
   write_detail_file(arguments.output, built.model);
   const std::uintmax_t file_bytes = fs::file_size(arguments.output);
-  if (arguments.json) {
+  if (arguments.wants_json) {
     print_json(arguments, built, file_bytes);
   } else {
     print_text(arguments, built, file_bytes);
@@ -193,7 +191,7 @@ void register_detail_build(CLI::App& detail, std::function<int()>& action) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   begin_group(*command, kMessagesGroup);
-  command->add_flag("--json", arguments->json, "Report as JSON");
+  command->add_flag("--json", arguments->wants_json, "Report as JSON");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_build(*arguments); }; });
 }

@@ -48,7 +48,7 @@ struct ExtractArguments {
   std::optional<double> distance_m;
   std::vector<double> eye_m;
   DetailView view;
-  bool json = false;
+  bool wants_json = false;
 };
 
 DetailLevels chosen_levels(const ExtractArguments& arguments, const DetailModel& model) {
@@ -131,7 +131,7 @@ int run_extract(const ExtractArguments& arguments) {
   }
   if (is_local) make_local(*mesh);
   write_mesh_file(arguments.output, *mesh);
-  if (arguments.json) {
+  if (arguments.wants_json) {
     print_json(model, levels, *mesh, arguments);
   } else {
     print_text(model, levels, *mesh, arguments);
@@ -196,7 +196,7 @@ void register_detail_extract(CLI::App& detail, std::function<int()>& action) {
       ->check(CLI::IsMember({"local", "crs"}))
       ->capture_default_str();
   begin_group(*command, kMessagesGroup);
-  command->add_flag("--json", arguments->json, "Say what was chosen as JSON");
+  command->add_flag("--json", arguments->wants_json, "Say what was chosen as JSON");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_extract(*arguments); }; });
 }

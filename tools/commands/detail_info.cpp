@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -18,6 +17,7 @@
 #include "tools/arguments/exit_codes.h"
 #include "tools/arguments/help_format.h"
 #include "tools/arguments/interrupt.h"
+#include "tools/arguments/terminal.h"
 #include "tools/commands/detail_commands.h"
 
 namespace qmpipe {
@@ -28,16 +28,14 @@ using Json = nlohmann::ordered_json;
 struct DetailVerifyArguments {
   std::string path;
   std::int32_t threads = 1;
-  bool json = false;
+  bool wants_json = false;
 };
 
 int run_verify(const DetailVerifyArguments& arguments) {
   const DetailModel model = load_model(arguments.path);
-  Progress progress(
-      ::isatty(STDERR_FILENO) != 0 ? ProgressStyle::kTerminal : ProgressStyle::kSilent,
-      stop_flag_of_signals());
+  Progress progress(progress_style(false), stop_flag_of_signals());
   const DetailVerifyReport report = verify_detail(model, arguments.threads, progress);
-  if (arguments.json) {
+  if (arguments.wants_json) {
     const Json document = {{"levels_walked", report.levels_walked},
                            {"triangles_checked", report.triangles_checked},
                            {"faults", report.faults}};
@@ -56,7 +54,7 @@ struct DetailInfoArguments {
   std::string chart;
   DetailView view;
   bool increments = false;
-  bool json = false;
+  bool wants_json = false;
 };
 
 Json block_json(const DetailBlock& block) {
@@ -121,7 +119,7 @@ int run_info(const DetailInfoArguments& arguments) {
     write_file_atomically(arguments.chart,
                           {reinterpret_cast<const std::uint8_t*>(page.data()), page.size()});
   }
-  if (!arguments.json) {
+  if (!arguments.wants_json) {
     print_info(arguments, model);
     if (arguments.increments)
       print_increments(increments_of(model, arguments.path), model.interval);
@@ -170,7 +168,7 @@ void register_detail_verify(CLI::App& detail, std::function<int()>& action) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   begin_group(*command, kMessagesGroup);
-  command->add_flag("--json", arguments->json, "Report as JSON");
+  command->add_flag("--json", arguments->wants_json, "Report as JSON");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_verify(*arguments); }; });
 }
@@ -198,7 +196,7 @@ void register_detail_info(CLI::App& detail, std::function<int()>& action) {
       "--increments", arguments->increments,
       "Walk through the model and tell how many triangles change a level, one by one and "
       "merged over its interval");
-  command->add_flag("--json", arguments->json, "Write JSON");
+  command->add_flag("--json", arguments->wants_json, "Write JSON");
   command->callback(
       [arguments, &action] { action = [arguments] { return run_info(*arguments); }; });
 }

@@ -1,7 +1,5 @@
 #include "tools/commands/diff.h"
 
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
@@ -14,6 +12,7 @@
 #include "tools/arguments/help_format.h"
 #include "tools/arguments/interrupt.h"
 #include "tools/arguments/number_options.h"
+#include "tools/arguments/terminal.h"
 
 namespace qmpipe {
 namespace {
@@ -44,9 +43,7 @@ struct DiffArguments {
 };
 
 int run_diff(const DiffArguments& arguments) {
-  const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
-  Progress progress(is_terminal ? ProgressStyle::kTerminal : ProgressStyle::kSilent,
-                    stop_flag_of_signals());
+  Progress progress(progress_style(false), stop_flag_of_signals());
   const std::unique_ptr<TileSet> a = open_tile_set(arguments.a);
   const std::unique_ptr<TileSet> b = open_tile_set(arguments.b);
   const DiffReport report = diff_sets(*a, *b, arguments.options, progress);

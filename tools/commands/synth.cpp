@@ -15,6 +15,7 @@
 #include "formats/raster/writer.h"
 #include "stages/synth/synth_terrain.h"
 #include "tools/arguments/help_format.h"
+#include "tools/arguments/terminal.h"
 
 namespace qmpipe {
 namespace {
@@ -68,7 +69,7 @@ void check_output(const SynthOptions& options) {
 // One line on a terminal that counts up; nothing elsewhere.
 class ProgressLine {
  public:
-  ProgressLine() : is_terminal_(isatty(STDERR_FILENO) == 1) {}
+  ProgressLine() : is_terminal_(stderr_is_terminal()) {}
   ~ProgressLine() {
     if (shown_ >= 0) std::fputc('\n', stderr);
   }

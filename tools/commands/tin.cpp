@@ -54,7 +54,7 @@ struct TinArguments {
   bool triangles_given = false;
   std::string frame = "local";
   std::string memory = "0";
-  bool json = false;
+  bool wants_json = false;
   bool verbose = false;
 };
 
@@ -227,7 +227,7 @@ int run_tin(const TinArguments& arguments) {
   const double write_s = watch.seconds();
   const Written written{
       .path = arguments.output, .bytes = fs::file_size(arguments.output), .write_s = write_s};
-  if (arguments.json) {
+  if (arguments.wants_json) {
     print_json(options, single, written);
   } else {
     print_text(options, single, written);
@@ -274,7 +274,7 @@ void add_options(CLI::App& command, TinArguments& arguments) {
   add_height_guard(command, arguments.heights);
   add_memory_option(command, arguments.memory);
   begin_group(command, kMessagesGroup);
-  command.add_flag("--json", arguments.json, "Print the statistics as JSON");
+  command.add_flag("--json", arguments.wants_json, "Print the statistics as JSON");
   command.add_flag("-v,--verbose", arguments.verbose, "Print every effective option first");
   command.footer(kTinFooter);
 }

@@ -1,7 +1,5 @@
 #include "tools/commands/verify.h"
 
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
@@ -16,6 +14,7 @@
 #include "tools/arguments/help_format.h"
 #include "tools/arguments/interrupt.h"
 #include "tools/arguments/number_options.h"
+#include "tools/arguments/terminal.h"
 
 namespace qmpipe {
 namespace {
@@ -65,9 +64,7 @@ struct VerifyArguments {
 int run_verify(VerifyArguments arguments) {
   if (arguments.wants_hausdorff) arguments.options.hausdorff = HausdorffMode::kMeasured;
   arguments.options.heights = to_height_options(arguments.heights);
-  const bool is_terminal = ::isatty(STDERR_FILENO) != 0;
-  Progress progress(is_terminal ? ProgressStyle::kTerminal : ProgressStyle::kSilent,
-                    stop_flag_of_signals());
+  Progress progress(progress_style(false), stop_flag_of_signals());
   const std::unique_ptr<TileSet> tile_set = open_tile_set(arguments.path);
   const VerifyReport report = verify(*tile_set, arguments.options, progress);
   const std::string text = arguments.wants_json ? json_of(report) : text_of(report);
