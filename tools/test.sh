@@ -123,7 +123,7 @@ tidy_file() {
   return 1
 }
 
-# The program's own files; the tests would double the time. Of them those that were changed in the six hours
+# The program's own files; the tests would double the time. Of them those that were changed in the four hours
 # before the newest commit, and of the others, which were clean when they last were, a third, each time another one
 # (QMPIPE_TIDY_ALL=1: all). Behind all else, so that it takes the cores that tests leave idle which run alone.
 tidy() {
@@ -139,11 +139,11 @@ git = lambda *words: subprocess.run(["git", *words], capture_output=True, text=T
 newest = git("log", "-1", "--format=%ct")
 count = git("rev-list", "--count", "HEAD")
 if newest.returncode == 0 and count.returncode == 0 and "QMPIPE_TIDY_ALL" not in os.environ:
-    before = git("rev-list", "-1", f"--before=@{int(newest.stdout) - 6 * 3600}", "HEAD").stdout.strip()
+    before = git("rev-list", "-1", f"--before=@{int(newest.stdout) - 4 * 3600}", "HEAD").stdout.strip()
     empty_tree = git("hash-object", "-t", "tree", "/dev/null").stdout.strip()
-    # Where a file moved, its includes change with it and nothing else. Fields: lines added, removed, and the
+    # Where a file moved, its includes and references change with it and nothing else. Fields: lines added, removed, and the
     # path, or an empty one and then the old and the new one.
-    words = git("diff", "-M", "--numstat", "-z", r"-I^\s*#\s*include", before or empty_tree).stdout.split("\0")
+    words = git("diff", "-M", "--numstat", "-z", r"-I^\s*(#\s*include|//)", before or empty_tree).stdout.split("\0")
     changed = set()
     while len(words) > 1:
         added, removed, path = words.pop(0).split("\t")
