@@ -4,15 +4,17 @@ given comes first, options stand in groups, numbers say their unit and what they
 
 usage: help_test.py QMPIPE [unittest's arguments]
 """
+import pathlib
 import re
 import subprocess
 import sys
 import unittest
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "tools" / "manual"))
+from help_pages import GROUPS, pages  # noqa: E402
+
 QMPIPE = None
 COLUMNS = 100
-GROUPS = ["Required", "Input", "Output", "Quality", "The papers' parameters", "Resources", "Commands",
-          "Messages"]
 UNITS = re.compile(r"metre|second|degree|pixel|zoom|thread|tile|triangle|share|level|block|connection|port"
                    r"|faults|bytes|512M|g_g=|number|\bm\b", re.IGNORECASE)
 # What these are when they are not given is another option's matter.
@@ -27,48 +29,10 @@ def run(*arguments):
                           stdin=subprocess.DEVNULL, check=False)
 
 
-class Page:
-    """A help text taken apart: usage, groups with their entries [what, text], and the rest."""
-
-    def __init__(self, text):
-        self.lines = text.splitlines()
-        self.usage = " ".join(line.strip() for line in self.lines if line.startswith("Usage: "))
-        self.groups = {}
-        entries = None
-        for line in self.lines:
-            if re.match(r"^[A-Z][\w' ]+:$", line) and line[:-1] in GROUPS + ["Options"]:
-                self.order = [*getattr(self, "order", []), line[:-1]]
-                entries = self.groups.setdefault(line[:-1], [])
-            elif not line.startswith("  "):
-                entries = None
-            elif entries is not None and not line.startswith(" " * 28):
-                what, _, said = line.strip().partition("  ")
-                entries.append([what, said.strip()])
-            elif entries is not None:
-                entries[-1][1] = (entries[-1][1] + " " + line.strip()).strip()
-
-    def options(self):
-        for group, entries in self.groups.items():
-            if group == "Commands":
-                continue
-            for what, text in entries:
-                names, _, value = what.replace(", ", ",").removesuffix(" ...").partition(" ")
-                yield group, names.split(","), value, text
-
-
-def pages(*command):
-    done = run(*command, "--help")
-    assert done.returncode == 0, done.stderr
-    page = Page(done.stdout)
-    yield command, page
-    for name, _ in page.groups.get("Commands", []):
-        yield from pages(*command, name)
-
-
 class Help(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.pages = dict(pages())
+        cls.pages = dict(pages(QMPIPE))
 
     def each(self, check):
         for command, page in self.pages.items():

@@ -8,7 +8,7 @@ out=${1:-demo}
 
 tools/setup.sh
 cmake --preset release >/dev/null
-cmake --build --preset release --target qmpipe
+cmake --build --preset release --target qmpipe manual
 qmpipe=build/release/tools/qmpipe
 
 mkdir -p "$out"
