@@ -1,6 +1,5 @@
 #include "formats/crs/foreign.h"
 
-#include <cpl_conv.h>
 #include <ogr_spatialref.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include "formats/bytes/letter_case.h"
 #include "formats/crs/gdal_session.h"
 #include "formats/crs/paths.h"
+#include "formats/crs/wkt.h"
 
 namespace qmpipe {
 namespace {
@@ -40,12 +40,7 @@ std::optional<Error> fault_of_foreign_crs(const std::string& text) {
   if (crs.SetFromUserInput(text.c_str(), options.data()) != OGRERR_NONE) {
     return Error{"is no CRS by itself"};
   }
-  char* wkt = nullptr;
-  const std::array<const char*, 2> format = {"FORMAT=WKT2_2019", nullptr};
-  crs.exportToWkt(&wkt, format.data());
-  const std::string meant = wkt != nullptr ? wkt : "";
-  CPLFree(wkt);
-  if (names_files(meant)) return Error{"names files"};
+  if (names_files(wkt_of(crs))) return Error{"names files"};
   return std::nullopt;
 }
 

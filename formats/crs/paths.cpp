@@ -4,8 +4,6 @@
 #include <cpl_string.h>
 
 #include <algorithm>
-#include <array>
-#include <vector>
 
 #include "formats/bytes/letter_case.h"
 

@@ -17,6 +17,7 @@
 #include "formats/crs/beside.h"
 #include "formats/crs/gdal_session.h"
 #include "formats/crs/paths.h"
+#include "formats/crs/wkt.h"
 #include "formats/raster/dataset.h"
 #include "formats/raster/height_unit.h"
 
@@ -104,11 +105,7 @@ std::string crs_in_keys(const std::string& path, const LasCrs& crs, const GdalSe
     const std::array<const char*, 2> drivers = {"GTiff", nullptr};
     const Dataset dataset(GDALDataset::Open(name.c_str(), GDAL_OF_RASTER, drivers.data()));
     const OGRSpatialReference* found = dataset ? dataset->GetSpatialRef() : nullptr;
-    char* text = nullptr;
-    const std::array<const char*, 2> options = {"FORMAT=WKT2_2019", nullptr};
-    if (found != nullptr) found->exportToWkt(&text, options.data());
-    if (text != nullptr) wkt = text;
-    CPLFree(text);
+    if (found != nullptr) wkt = wkt_of(*found);
   }
   VSIUnlink(name.c_str());
   if (wkt.empty()) {

@@ -1,6 +1,5 @@
 #include "formats/raster/crs.h"
 
-#include <cpl_conv.h>
 #include <cpl_string.h>
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>
@@ -14,6 +13,7 @@
 #include "formats/bytes/errors.h"
 #include "formats/crs/beside.h"
 #include "formats/crs/paths.h"
+#include "formats/crs/wkt.h"
 #include "formats/raster/dataset.h"
 
 namespace qmpipe {
@@ -117,15 +117,6 @@ OGRSpatialReference crs_from_prj(const fs::path& prj) {
                   kNoCrsRemedy);
   }
   return crs;
-}
-
-std::string wkt_of(const OGRSpatialReference& crs) {
-  char* text = nullptr;
-  const std::array<const char*, 2> options = {"FORMAT=WKT2_2019", nullptr};
-  crs.exportToWkt(&text, options.data());
-  std::string wkt = text != nullptr ? text : "";
-  CPLFree(text);
-  return wkt;
 }
 
 // Empty where there is none and none is required.
