@@ -10,7 +10,7 @@
 #include "formats/run_store/hdf5_lattice_store.h"
 #include "perf/cold_files.h"
 #include "scheduler/check.h"
-#include "tests/lattice_blocks.h"
+#include "tests/support/lattice_blocks.h"
 
 namespace qmpipe::perf {
 namespace {

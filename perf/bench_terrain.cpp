@@ -11,7 +11,7 @@
 #include "scheduler/wavefront.h"
 #include "stages/posts/height_step.h"
 #include "stages/synth/synth_terrain.h"
-#include "tests/raster_fixture.h"
+#include "tests/support/raster_fixture.h"
 
 namespace qmpipe::perf {
 namespace {

@@ -14,7 +14,7 @@
 #include "stages/greedy/greedy.h"
 #include "stages/posts/heightfield.h"
 #include "stages/posts/sampling.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace qmpipe::perf {
 

@@ -12,7 +12,7 @@
 #include "stages/detail_model/block.h"
 #include "stages/detail_model/increment.h"
 #include "stages/synth/synth_terrain.h"
-#include "tests/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace qmpipe::perf {
 namespace {

@@ -22,7 +22,7 @@
 #include "perf/register_benchmarks.h"
 #include "stages/edge_collapse/edge_collapse.h"
 #include "stages/surface/base_tin.h"
-#include "tests/terrain_fixture.h"
+#include "tests/support/terrain_fixture.h"
 
 namespace qmpipe::perf {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "perf/bench_terrain.h"
 #include "perf/register_benchmarks.h"
-#include "tests/terrain_fixture.h"
+#include "tests/support/terrain_fixture.h"
 
 namespace qmpipe::perf {
 namespace {

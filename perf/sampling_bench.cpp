@@ -11,7 +11,7 @@
 #include "formats/run_store/lattice_store.h"
 #include "perf/bench_terrain.h"
 #include "perf/register_benchmarks.h"
-#include "tests/raster_fixture.h"
+#include "tests/support/raster_fixture.h"
 
 namespace qmpipe::perf {
 namespace {

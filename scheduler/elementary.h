@@ -3,8 +3,8 @@
 // A C library chooses among several versions of its sines and logarithms by what the processor can
 // do (fused multiplication, for one), and these differ in their last bits. Whatever reaches a byte of
 // an output uses these instead, which are made of +, -, *, / and square roots: IEEE 754 rounds those
-// alike everywhere. tests/layering_test.py refuses the library's.
-// Guarantees: the errors below, measured against long double by tests/elementary_test.cpp, in units
+// alike everywhere. tests/house/layering_test.py refuses the library's.
+// Guarantees: the errors below, measured against long double by tests/scheduler/elementary_test.cpp, in units
 // in the last place (ulp) of the result. Angles are in degrees, whose multiples of 90 are exact, as
 // poles and the antimeridian need it.
 #pragma once

@@ -18,7 +18,8 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::array<std::uint8_t, 8> kSignature = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1A, '\n'};
+constexpr std::array<std::uint8_t, 8> kHdf5Signature = {0x89, 'H',  'D',  'F',
+                                                        '\r', '\n', 0x1A, '\n'};
 constexpr std::size_t kSuperblockBytes = 96;
 constexpr std::size_t kHeaderPrefixBytes = 16;
 constexpr std::size_t kNodePrefixBytes = 24;
@@ -57,8 +58,9 @@ class Hdf5Structure::Parser {
     const auto bytes = read_file_range(path_, 0, kSuperblockBytes);
     if (!bytes) return foreign;
     ByteCursor cursor(*bytes);
-    const bool is_hdf5 = std::memcmp(bytes->data(), kSignature.data(), kSignature.size()) == 0;
-    cursor.skip(kSignature.size());
+    const bool is_hdf5 =
+        std::memcmp(bytes->data(), kHdf5Signature.data(), kHdf5Signature.size()) == 0;
+    cursor.skip(kHdf5Signature.size());
     // Versions of the superblock and of what it leads to, then the bytes of an address and a size.
     const std::array<int, 8> numbers = {cursor.u8(), cursor.u8(), cursor.u8(), cursor.u8(),
                                         cursor.u8(), cursor.u8(), cursor.u8(), cursor.u8()};

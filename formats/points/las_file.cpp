@@ -113,9 +113,8 @@ std::size_t least_header_bytes(int minor_version) {
 }
 
 std::optional<Error> check_signature(const Bytes& bytes, std::uint64_t size_bytes) {
-  constexpr std::string_view kSignature = "LASF";
-  if (bytes.size() < kSignature.size() ||
-      !std::equal(kSignature.begin(), kSignature.end(), bytes.begin())) {
+  if (bytes.size() < kLasSignature.size() ||
+      !std::equal(kLasSignature.begin(), kLasSignature.end(), bytes.begin())) {
     return Error{"it does not begin with LASF, as a LAS file does"};
   }
   if (bytes.size() < kOldHeaderBytes) {

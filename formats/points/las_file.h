@@ -11,11 +11,15 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "formats/bytes/result.h"
 
 namespace qmpipe {
+
+// What every LAS file begins with.
+inline constexpr std::string_view kLasSignature = "LASF";
 
 // Bytes that are read in pieces: of a file, or of memory in tests.
 struct ByteSource {

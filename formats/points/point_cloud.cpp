@@ -59,9 +59,8 @@ std::vector<std::uint8_t> first_bytes(const fs::path& path, std::size_t most) {
 }
 
 bool begins_like_las(const fs::path& path) {
-  constexpr std::string_view kSignature = "LASF";
-  const std::vector<std::uint8_t> bytes = first_bytes(path, kSignature.size());
-  return std::equal(bytes.begin(), bytes.end(), kSignature.begin(), kSignature.end());
+  const std::vector<std::uint8_t> bytes = first_bytes(path, kLasSignature.size());
+  return std::equal(bytes.begin(), bytes.end(), kLasSignature.begin(), kLasSignature.end());
 }
 
 bool begins_like_text(const fs::path& path) {

@@ -14,8 +14,6 @@
 namespace qmpipe {
 namespace {
 
-using nlohmann::json;
-
 constexpr std::size_t kMostReportBytes = std::size_t{64} << 20U;
 
 // None when it is no JSON object with these members.
@@ -26,11 +24,11 @@ struct ReadReport {
 };
 
 std::optional<ReadReport> read_report(const std::string& text) try {
-  const json report = json::parse(text);
+  const nlohmann::json report = nlohmann::json::parse(text);
   return ReadReport{.built_from = report.at("built_from").dump(),
                     .layer_version = report.at("layer_version").get<std::string>(),
                     .tiles = report.at("tiles").get<std::int64_t>()};
-} catch (const json::exception&) {
+} catch (const nlohmann::json::exception&) {
   return std::nullopt;
 }
 

@@ -5,8 +5,6 @@
 namespace qmpipe {
 namespace {
 
-using nlohmann::json;
-
 // Calls visit(name, value) for every sum: what is written and what is read cannot differ.
 template <class Zoom, class Visit>
 void visit_zoom(Zoom& zoom, const Visit& visit) {
@@ -35,27 +33,27 @@ void visit_report(Report& report, const Visit& visit) {
 }  // namespace
 
 std::string write_report_state(const BuildReport& report) {
-  json object;
-  const auto write_into = [](json& to) {
+  nlohmann::json object;
+  const auto write_into = [](nlohmann::json& to) {
     return [&to](const char* name, const auto& value) { to[name] = value; };
   };
   visit_report(report, write_into(object));
-  object["zooms"] = json::array();
+  object["zooms"] = nlohmann::json::array();
   for (const BuiltZoom& zoom : report.zooms) {
-    json& entry = object["zooms"].emplace_back(json{{"zoom", zoom.zoom}});
+    nlohmann::json& entry = object["zooms"].emplace_back(nlohmann::json{{"zoom", zoom.zoom}});
     visit_zoom(zoom, write_into(entry));
   }
   return object.dump();
 }
 
 Result<BuildReport> with_report_state(BuildReport into, const std::string& text) {
-  const json object = json::parse(text, nullptr, false);
+  const nlohmann::json object = nlohmann::json::parse(text, nullptr, false);
   if (!object.is_object() || !object.contains("zooms") || !object["zooms"].is_array() ||
       object["zooms"].size() != into.zooms.size()) {
     return Error{"its statistics do not fit the zooms of this run"};
   }
   std::string problem;
-  const auto read_from = [&problem](const json& from) {
+  const auto read_from = [&problem](const nlohmann::json& from) {
     return [&from, &problem](const char* name, auto& value) {
       const auto found = from.is_object() ? from.find(name) : from.end();
       if (found == from.end() || !found->is_number()) {
@@ -67,7 +65,7 @@ Result<BuildReport> with_report_state(BuildReport into, const std::string& text)
   };
   visit_report(into, read_from(object));
   for (std::size_t k = 0; k < into.zooms.size(); ++k) {
-    const json& entry = object["zooms"][k];
+    const nlohmann::json& entry = object["zooms"][k];
     std::int32_t zoom = -1;
     read_from(entry)("zoom", zoom);
     if (problem.empty() && zoom != into.zooms[k].zoom) {

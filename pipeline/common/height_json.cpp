@@ -5,8 +5,6 @@
 namespace qmpipe {
 namespace {
 
-using nlohmann::json;
-
 // Nothing that names a file or a server: the recipe is public, and whoever checks a set takes it over.
 bool is_harmless(const std::string& option) {
   return option.find_first_not_of(
@@ -16,8 +14,8 @@ bool is_harmless(const std::string& option) {
 
 // What is read under a name, or what is wrong with it.
 template <class Value, class Read>
-void read_named(const json& object, const char* name, const Read& read, std::optional<Value>& into,
-                std::string& problem) {
+void read_named(const nlohmann::json& object, const char* name, const Read& read,
+                std::optional<Value>& into, std::string& problem) {
   const auto it = object.find(name);
   if (it == object.end() || !problem.empty()) return;
   const Result<Value> value = read(*it);
@@ -28,13 +26,13 @@ void read_named(const json& object, const char* name, const Read& read, std::opt
   }
 }
 
-void read_options(const json& object, const char* name, std::vector<std::string>& into,
+void read_options(const nlohmann::json& object, const char* name, std::vector<std::string>& into,
                   std::string& problem) {
   const auto it = object.find(name);
   if (it == object.end() || !problem.empty()) return;
   // Whatever else it is makes a list of one that is none.
-  const json list = it->is_array() ? *it : json::array({nullptr});
-  for (const json& option : list) {
+  const nlohmann::json list = it->is_array() ? *it : nlohmann::json::array({nullptr});
+  for (const nlohmann::json& option : list) {
     if (!option.is_string() || !is_harmless(option.get<std::string>())) {
       problem = std::string("the recipe's \"") + name + "\" names files or is no list of options";
       return;
@@ -45,18 +43,18 @@ void read_options(const json& object, const char* name, std::vector<std::string>
 
 template <class Value>
 auto from_text(Result<Value> (*named)(const std::string&)) {
-  return [named](const json& value) -> Result<Value> {
+  return [named](const nlohmann::json& value) -> Result<Value> {
     if (!value.is_string()) return Error{"it is no text"};
     return named(value.get<std::string>());
   };
 }
 
-Result<std::int32_t> band_number(const json& value) {
+Result<std::int32_t> band_number(const nlohmann::json& value) {
   if (!value.is_number_integer() || value.get<double>() > 65535) return Error{"it is no band"};
   return value.get<std::int32_t>();
 }
 
-Result<double> number(const json& value) {
+Result<double> number(const nlohmann::json& value) {
   if (!value.is_number()) return Error{"it is no number"};
   return value.get<double>();
 }
@@ -64,7 +62,7 @@ Result<double> number(const json& value) {
 }  // namespace
 
 std::string write_heights(const HeightOptions& heights) {
-  json object = json::object();
+  nlohmann::json object = nlohmann::json::object();
   if (heights.voids) object["void"] = text_of(*heights.voids);
   if (heights.band) object["band"] = *heights.band;
   if (heights.encoding) object["encoding"] = name_of(*heights.encoding);
@@ -80,11 +78,11 @@ std::string write_heights(const HeightOptions& heights) {
     if (!is_secret(option)) object["config"].push_back(option_name(option));
   }
   // A name may be any bytes.
-  return object.dump(-1, ' ', false, json::error_handler_t::replace);
+  return object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 Result<HeightOptions> parse_heights(const std::string& text) {
-  const json object = json::parse(text, nullptr, false);
+  const nlohmann::json object = nlohmann::json::parse(text, nullptr, false);
   if (!object.is_object()) return Error{"the recipe's \"heights\" is no JSON object"};
   HeightOptions heights;
   std::string problem;

@@ -13,8 +13,6 @@
 namespace qmpipe {
 namespace {
 
-using nlohmann::json;
-
 // The same file whatever folder the program is started in; names that are no paths stay as they are.
 std::string absolute_name(const std::string& path) {
   std::error_code code;
@@ -23,10 +21,10 @@ std::string absolute_name(const std::string& path) {
   return code ? path : absolute.string();
 }
 
-json inputs_of(const InputOptions& input) {
-  json inputs = json::array();
+nlohmann::json inputs_of(const InputOptions& input) {
+  nlohmann::json inputs = nlohmann::json::array();
   for (const std::string& path : input.paths) {
-    json files = json::object();
+    nlohmann::json files = nlohmann::json::object();
     for (const RasterFile& file : files_of_raster(path, input.heights.open_options)) {
       files[absolute_name(file.path)] = {{"bytes", file.bytes}, {"modified_ns", file.modified_ns}};
     }
@@ -40,26 +38,28 @@ std::string hash_text(const std::string& text) {
                      hash64({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, 0));
 }
 
-json parameters_of(const BuildOptions& options) {
+nlohmann::json parameters_of(const BuildOptions& options) {
   const MeshOptions& mesh = options.mesh;
-  json tolerance_at = json::object();
+  nlohmann::json tolerance_at = nlohmann::json::object();
   for (const auto& [zoom, metres] : mesh.tolerance_at_m) {
     tolerance_at[std::to_string(zoom)] = metres;
   }
-  json parameters = {
+  nlohmann::json parameters = {
       {"--source-crs", options.input.source_crs},
       {"--resampling", name_of(options.input.resampling)},
       {"--reduce", name_of(mesh.reduction)},
       {"--nodata", name_of(mesh.voids)},
       {"--scheme", mesh.projection == Projection::kGeodetic ? "geodetic" : "mercator"},
       {"--min-zoom", mesh.min_zoom},
-      {"--max-zoom", mesh.max_zoom ? json(*mesh.max_zoom) : json("from the pixels")},
+      {"--max-zoom",
+       mesh.max_zoom ? nlohmann::json(*mesh.max_zoom) : nlohmann::json("from the pixels")},
       {"--method", name_of(mesh.method)},
       {"--stop", name_of(mesh.stop)},
       {"--tolerance-at", tolerance_at},
-      {"--gzip", options.encode.gzip_level ? json(*options.encode.gzip_level) : json("none")},
+      {"--gzip", options.encode.gzip_level ? nlohmann::json(*options.encode.gzip_level)
+                                           : nlohmann::json("none")},
       {"normals", options.encode.normals}};
-  const json heights = json::parse(write_heights(options.input.heights));
+  const nlohmann::json heights = nlohmann::json::parse(write_heights(options.input.heights));
   for (const auto& [name, value] : heights.items()) parameters["--" + name] = value;
   // Values that are not written.
   std::string hidden;
@@ -80,10 +80,10 @@ json parameters_of(const BuildOptions& options) {
 
 // The members that one of the objects has otherwise than the other, or not at all.
 template <class Say>
-void compare_members(const json& earlier, const json& now, const Say& say) {
-  const json none;
+void compare_members(const nlohmann::json& earlier, const nlohmann::json& now, const Say& say) {
+  const nlohmann::json none;
   for (const auto& [name, value] : earlier.items()) {
-    const json& other = now.contains(name) ? now[name] : none;
+    const nlohmann::json& other = now.contains(name) ? now[name] : none;
     if (other != value) say(name, value, other);
   }
   for (const auto& [name, value] : now.items()) {
@@ -91,10 +91,12 @@ void compare_members(const json& earlier, const json& now, const Say& say) {
   }
 }
 
-void compare_inputs(const json& earlier, const json& now, std::vector<std::string>& differences) {
-  const auto names = [](const json& inputs) {
+void compare_inputs(const nlohmann::json& earlier, const nlohmann::json& now,
+                    std::vector<std::string>& differences) {
+  const auto names = [](const nlohmann::json& inputs) {
     std::string text;
-    for (const json& input : inputs) text += (text.empty() ? "" : ", ") + input.at("name").dump();
+    for (const nlohmann::json& input : inputs)
+      text += (text.empty() ? "" : ", ") + input.at("name").dump();
     return text;
   };
   if (names(earlier) != names(now)) {
@@ -104,7 +106,8 @@ void compare_inputs(const json& earlier, const json& now, std::vector<std::strin
   }
   for (std::size_t k = 0; k < now.size(); ++k) {
     compare_members(earlier.at(k).at("files"), now.at(k).at("files"),
-                    [&differences](const std::string& name, const json& was, const json& is) {
+                    [&differences](const std::string& name, const nlohmann::json& was,
+                                   const nlohmann::json& is) {
                       const char* what = was.is_null()  ? "was not there before"
                                          : is.is_null() ? "is gone"
                                                         : "has changed (its size or time)";
@@ -114,22 +117,25 @@ void compare_inputs(const json& earlier, const json& now, std::vector<std::strin
 }
 
 // What layer.json says of the set besides.
-json texts_of(const OutputOptions& output) {
+nlohmann::json texts_of(const OutputOptions& output) {
   return {{"--name", output.name},
           {"--description", output.description},
           {"--attribution", output.attribution}};
 }
 
-void compare_versions(const json& was, const json& is, std::vector<std::string>& differences) {
+void compare_versions(const nlohmann::json& was, const nlohmann::json& is,
+                      std::vector<std::string>& differences) {
   if (was.at("program_version") == is.at("program_version")) return;
   differences.push_back(fmt::format("it was begun by version {} of the program, and this is {}",
                                     was.at("program_version").dump(),
                                     is.at("program_version").dump()));
 }
 
-void compare_values(const json& was, const json& is, std::vector<std::string>& differences) {
+void compare_values(const nlohmann::json& was, const nlohmann::json& is,
+                    std::vector<std::string>& differences) {
   compare_members(was, is,
-                  [&differences](const std::string& name, const json& before, const json& after) {
+                  [&differences](const std::string& name, const nlohmann::json& before,
+                                 const nlohmann::json& after) {
                     differences.push_back(
                         fmt::format("{} was {}, and is {} now", name, before.dump(), after.dump()));
                   });
@@ -142,8 +148,8 @@ std::vector<std::string> differences_between(const std::string& earlier, const s
                                              const char* foreign,
                                              const CompareOwn& compare_own) try {
   if (earlier == now) return {};
-  const json was = json::parse(earlier);
-  const json is = json::parse(now);
+  const nlohmann::json was = nlohmann::json::parse(earlier);
+  const nlohmann::json is = nlohmann::json::parse(now);
   std::vector<std::string> differences;
   compare_versions(was, is, differences);
   compare_own(was, is, differences);
@@ -151,17 +157,17 @@ std::vector<std::string> differences_between(const std::string& earlier, const s
   // Only a finished set's has them.
   if (is.contains("texts")) compare_values(was.at("texts"), is.at("texts"), differences);
   return differences;
-} catch (const json::exception&) {
+} catch (const nlohmann::json::exception&) {
   return {foreign};
 }
 
 }  // namespace
 
 std::string provenance_of(const BuildOptions& options) {
-  const json provenance = {{"program_version", kProgramVersion},
-                           {"inputs_hash", hash_text(inputs_of(options.input).dump())},
-                           {"parameters", parameters_of(options)},
-                           {"texts", texts_of(options.output)}};
+  const nlohmann::json provenance = {{"program_version", kProgramVersion},
+                                     {"inputs_hash", hash_text(inputs_of(options.input).dump())},
+                                     {"parameters", parameters_of(options)},
+                                     {"texts", texts_of(options.output)}};
   return provenance.dump();
 }
 
@@ -169,26 +175,27 @@ std::vector<std::string> provenance_differences(const std::string& earlier,
                                                 const std::string& now) {
   return differences_between(
       earlier, now, "its report was written by another program",
-      [](const json& was, const json& is, std::vector<std::string>& differences) {
+      [](const nlohmann::json& was, const nlohmann::json& is,
+         std::vector<std::string>& differences) {
         if (was.at("inputs_hash") == is.at("inputs_hash")) return;
         differences.emplace_back("the inputs were others, or have changed (their sizes or times)");
       });
 }
 
 std::string fingerprint_of(const BuildOptions& options) {
-  const json fingerprint = {{"program_version", kProgramVersion},
-                            {"inputs", inputs_of(options.input)},
-                            {"parameters", parameters_of(options)}};
+  const nlohmann::json fingerprint = {{"program_version", kProgramVersion},
+                                      {"inputs", inputs_of(options.input)},
+                                      {"parameters", parameters_of(options)}};
   return fingerprint.dump();
 }
 
 std::vector<std::string> fingerprint_differences(const std::string& earlier,
                                                  const std::string& now) {
-  return differences_between(
-      earlier, now, "the journal was written by another program",
-      [](const json& was, const json& is, std::vector<std::string>& differences) {
-        compare_inputs(was.at("inputs"), is.at("inputs"), differences);
-      });
+  return differences_between(earlier, now, "the journal was written by another program",
+                             [](const nlohmann::json& was, const nlohmann::json& is,
+                                std::vector<std::string>& differences) {
+                               compare_inputs(was.at("inputs"), is.at("inputs"), differences);
+                             });
 }
 
 }  // namespace qmpipe

@@ -15,8 +15,6 @@
 namespace qmpipe {
 namespace {
 
-using nlohmann::json;
-
 constexpr std::int64_t kMostParameterFileBytes = 1 << 20;
 
 // Defaults: Campos et al. 2020, Table 3, but for g_g (pipeline/recipe/method.h says why).
@@ -64,11 +62,12 @@ void require_in_range(const ParameterInfo& info, double value, const std::string
                                info.whole ? ", a whole number" : ""));
 }
 
-ZoomSeries series_in(const json& value, const std::string& path, const std::string& name) {
+ZoomSeries series_in(const nlohmann::json& value, const std::string& path,
+                     const std::string& name) {
   std::vector<double> values;
   if (value.is_number()) values.push_back(value.get<double>());
   if (value.is_array()) {
-    for (const json& element : value) {
+    for (const nlohmann::json& element : value) {
       if (element.is_number()) values.push_back(element.get<double>());
     }
     if (values.size() != value.size()) values.clear();
@@ -157,7 +156,8 @@ void MethodParameters::set(const std::string& name, const ZoomSeries& series) {
 void read_parameter_file(const std::string& path, MethodParameters& parameters) {
   const auto bytes = read_file_bytes(path, kMostParameterFileBytes);
   if (!bytes) throw IoError("cannot read the parameters", path, bytes.error().message, "");
-  const json object = json::parse(bytes->begin(), bytes->end(), nullptr, false, true);
+  const nlohmann::json object =
+      nlohmann::json::parse(bytes->begin(), bytes->end(), nullptr, false, true);
   if (!object.is_object()) {
     throw UsageError(path + ": no JSON object, such as {\"g_e\": \"15000/2\", \"g_g\": 10}");
   }

@@ -13,8 +13,6 @@
 namespace qmpipe {
 namespace {
 
-using nlohmann::json;
-
 template <class Value>
 struct Named {
   Value value;
@@ -49,17 +47,17 @@ Result<Value> value_in(const Named<Value> (&table)[kCount], const std::string& n
   return Error{fmt::format("\"{}\" is no {}; choose one of {}", name, what, known)};
 }
 
-bool read_value(const json& value, std::string& into) {
+bool read_value(const nlohmann::json& value, std::string& into) {
   if (!value.is_string()) return false;
   into = value.get<std::string>();
   return true;
 }
-bool read_value(const json& value, bool& into) {
+bool read_value(const nlohmann::json& value, bool& into) {
   if (!value.is_boolean()) return false;
   into = value.get<bool>();
   return true;
 }
-bool read_value(const json& value, std::int32_t& into) {
+bool read_value(const nlohmann::json& value, std::int32_t& into) {
   if (!value.is_number_integer()) return false;
   // A larger one would wrap into another.
   const double number = value.get<double>();
@@ -67,17 +65,17 @@ bool read_value(const json& value, std::int32_t& into) {
   into = value.get<std::int32_t>();
   return true;
 }
-bool read_value(const json& value, std::vector<double>& into) {
+bool read_value(const nlohmann::json& value, std::vector<double>& into) {
   if (!value.is_array()) return false;
   into.clear();
-  for (const json& element : value) {
+  for (const nlohmann::json& element : value) {
     if (!element.is_number()) return false;
     into.push_back(element.get<double>());
   }
   return true;
 }
 
-bool read_value(const json& value, std::map<std::string, std::vector<double>>& into) {
+bool read_value(const nlohmann::json& value, std::map<std::string, std::vector<double>>& into) {
   if (!value.is_object()) return false;
   into.clear();
   for (const auto& [name, list] : value.items()) {
@@ -88,7 +86,8 @@ bool read_value(const json& value, std::map<std::string, std::vector<double>>& i
 
 // Leaves the first problem that was met in `problem`.
 template <class Value>
-void read_member(const json& object, const char* name, Value& into, std::string& problem) {
+void read_member(const nlohmann::json& object, const char* name, Value& into,
+                 std::string& problem) {
   if (!problem.empty()) return;
   const auto it = object.find(name);
   if (it == object.end()) {
@@ -99,8 +98,8 @@ void read_member(const json& object, const char* name, Value& into, std::string&
 }
 
 template <class Value>
-void read_named(const json& object, const char* name, Result<Value> (*parse)(const std::string&),
-                Value& into, std::string& problem) {
+void read_named(const nlohmann::json& object, const char* name,
+                Result<Value> (*parse)(const std::string&), Value& into, std::string& problem) {
   std::string text;
   read_member(object, name, text, problem);
   if (!problem.empty()) return;
@@ -112,7 +111,7 @@ void read_named(const json& object, const char* name, Result<Value> (*parse)(con
   }
 }
 
-void read_heights(const json& object, HeightOptions& into, std::string& problem) {
+void read_heights(const nlohmann::json& object, HeightOptions& into, std::string& problem) {
   const auto it = object.find("heights");
   if (it == object.end()) return;
   const Result<HeightOptions> heights = parse_heights(it->dump());
@@ -206,28 +205,30 @@ MethodOptions Recipe::options_for(const TileKey& key, const HeightSteps& steps) 
 }
 
 std::string write_recipe(const Recipe& recipe) {
-  json object = {{"program_version", recipe.program_version},
-                 {"scheme", recipe.projection == Projection::kGeodetic ? "geodetic" : "mercator"},
-                 {"sampling_zoom", recipe.sampling_zoom},
-                 {"min_zoom", recipe.min_zoom},
-                 {"max_zoom", recipe.max_zoom},
-                 {"source_crs", recipe.source_crs},
-                 {"resampling", name_of(recipe.resampling)},
-                 {"reduce", name_of(recipe.reduction)},
-                 {"nodata", name_of(recipe.voids)},
-                 {"nodata_base_zoom", recipe.voids.base_zoom},
-                 {"method", name_of(recipe.method)},
-                 {"tolerance_m", recipe.tolerance_m},
-                 {"height_step_m", recipe.height_step_m},
-                 {"stop", name_of(recipe.stop)},
-                 {"parameters", recipe.parameters},
-                 {"normals", recipe.normals}};
-  if (!recipe.heights.is_default()) object["heights"] = json::parse(write_heights(recipe.heights));
+  nlohmann::json object = {
+      {"program_version", recipe.program_version},
+      {"scheme", recipe.projection == Projection::kGeodetic ? "geodetic" : "mercator"},
+      {"sampling_zoom", recipe.sampling_zoom},
+      {"min_zoom", recipe.min_zoom},
+      {"max_zoom", recipe.max_zoom},
+      {"source_crs", recipe.source_crs},
+      {"resampling", name_of(recipe.resampling)},
+      {"reduce", name_of(recipe.reduction)},
+      {"nodata", name_of(recipe.voids)},
+      {"nodata_base_zoom", recipe.voids.base_zoom},
+      {"method", name_of(recipe.method)},
+      {"tolerance_m", recipe.tolerance_m},
+      {"height_step_m", recipe.height_step_m},
+      {"stop", name_of(recipe.stop)},
+      {"parameters", recipe.parameters},
+      {"normals", recipe.normals}};
+  if (!recipe.heights.is_default())
+    object["heights"] = nlohmann::json::parse(write_heights(recipe.heights));
   return object.dump();
 }
 
 Result<Recipe> parse_recipe(const std::string& text) {
-  const json object = json::parse(text, nullptr, false);
+  const nlohmann::json object = nlohmann::json::parse(text, nullptr, false);
   if (!object.is_object()) return Error{"the recipe is no JSON object"};
   Recipe recipe;
   std::string problem;

@@ -19,7 +19,6 @@ namespace qmpipe {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 
 constexpr const char* kJournalName = "journal";
 constexpr std::size_t kMostJournalBytes = std::size_t{1} << 30U;
@@ -142,7 +141,7 @@ void RunRecord::read_lines(const std::string& fingerprint) {
 }
 
 bool RunRecord::read_line(const std::string& line) try {
-  const json object = json::parse(line);
+  const nlohmann::json object = nlohmann::json::parse(line);
   is_clearing_ = false;
   if (object.contains("output_begun")) {
     is_output_ours_ = true;
@@ -163,7 +162,7 @@ bool RunRecord::read_line(const std::string& line) try {
               .report_state = object.at("report").dump()};
   }
   return true;
-} catch (const json::exception&) {
+} catch (const nlohmann::json::exception&) {
   return false;
 }
 
@@ -200,12 +199,12 @@ bool RunRecord::is_unfinished(const fs::path& folder) {
   if (!content) return true;
   // A line that is no JSON contains nothing.
   return content->lines.empty() ||
-         !json::parse(content->lines.back(), nullptr, false).contains("finished");
+         !nlohmann::json::parse(content->lines.back(), nullptr, false).contains("finished");
 }
 
 void RunRecord::begin_output(const fs::path& output) {
   output_ = output;
-  if (!is_output_ours_) journal_->append(json{{"output_begun", true}}.dump());
+  if (!is_output_ours_) journal_->append(nlohmann::json{{"output_begun", true}}.dump());
   is_output_ours_ = true;
 }
 
@@ -228,36 +227,36 @@ SurveyedZoom RunRecord::surveyed(std::int32_t zoom, const TilingScheme& scheme) 
 void RunRecord::add_surveyed(std::int32_t zoom, const SurveyedZoom& surveyed) {
   write_survey_file(survey_file_path(folder_, zoom), zoom, surveyed);
   const std::int32_t segments = count_lattice_segments(folder_);
-  journal_->append(json{{"surveyed_zoom", zoom}, {"lattice_segments", segments}}.dump());
+  journal_->append(nlohmann::json{{"surveyed_zoom", zoom}, {"lattice_segments", segments}}.dump());
   surveyed_[zoom] = segments;
 }
 
 void RunRecord::set_plan(const std::string& plan) {
-  const json parsed = json::parse(plan);
+  const nlohmann::json parsed = nlohmann::json::parse(plan);
   const std::string text = parsed.dump();
   if (plan_ && *plan_ != text) {
     refuse("the survey finds other tiles or heights than before, so the input was changed");
   }
-  if (!plan_) journal_->append(json{{"plan", parsed}}.dump());
+  if (!plan_) journal_->append(nlohmann::json{{"plan", parsed}}.dump());
   plan_ = text;
 }
 
 void RunRecord::add_tiles(const TileCheckpoint& checkpoint) {
-  journal_->append(json{{"tiles_done", checkpoint.tiles_done},
-                        {"border_segments", checkpoint.border_segments},
-                        {"report", json::parse(checkpoint.report_state)}}
+  journal_->append(nlohmann::json{{"tiles_done", checkpoint.tiles_done},
+                                  {"border_segments", checkpoint.border_segments},
+                                  {"report", nlohmann::json::parse(checkpoint.report_state)}}
                        .dump());
   tiles_ = checkpoint;
 }
 
 void RunRecord::finish(bool keep) {
   if (keep) {
-    journal_->append(json{{"finished", true}}.dump());
+    journal_->append(nlohmann::json{{"finished", true}}.dump());
     is_kept_ = true;
     return;
   }
   // First of all: a crash must not leave a journal that counts on what is gone.
-  journal_->append(json{{"stores_removed", true}}.dump());
+  journal_->append(nlohmann::json{{"stores_removed", true}}.dump());
   remove_folder();
 }
 

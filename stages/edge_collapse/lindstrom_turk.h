@@ -5,7 +5,7 @@
 // Everything about an edge comes from sums over the stars of its two ends, each kept relative to the
 // end's own place: a star's triangles all pass through it, so that their planes' constants vanish,
 // and nothing is lost by cancellation on nearly flat terrain. Agrees with CGAL's policies of that
-// name (tests/edge_collapse_cgal_test.cpp).
+// name (tests/stages/edge_collapse/edge_collapse_cgal_test.cpp).
 #pragma once
 
 #include <cstdint>
