@@ -61,7 +61,7 @@ std::unique_ptr<LatticeStore> open_disk_store(const std::filesystem::path& folde
 void put_all(LatticeStore& store, const LatticeInputs& inputs) {
   const std::vector<TileKey>& tiles = inputs.dem->tiles();
   for (std::size_t k = 0; k < tiles.size(); ++k) {
-    store.put_block(tiles[k].zoom, tiles[k].x, tiles[k].y, inputs.blocks[k]);
+    store.put_block(tiles[k], inputs.blocks[k]);
   }
   store.seal();
 }

@@ -48,7 +48,7 @@ void sample_blocks(benchmark::State& state, const SampledRaster& raster, Resampl
   const Lattice lattice(scheme, sampling_zoom_for(scheme, std::span(&info, 1)));
   const std::vector<PostWindow> blocks = blocks_of(info, lattice);
   const auto sampler = open_sampler(raster.path, resampling);
-  std::vector<float> heights_m(static_cast<std::size_t>(kBlockPosts) * kBlockPosts);
+  std::vector<float> heights_m(kBlockSize);
   for (const PostWindow& block : blocks) sampler->sample(lattice, block, heights_m);
   std::size_t next = 0;
   for (auto _ : state) {

@@ -45,12 +45,11 @@ class Hdf5LatticeStore final : public LatticeStore {
   // REQUIRES: segments are loaded in the order of their numbers, before anything else.
   std::optional<Error> load_segment(std::int32_t number);
 
-  void put_block(std::int32_t zoom, std::int32_t bx, std::int32_t by,
-                 std::span<const float> heights_m) override;
-  bool has_block(std::int32_t zoom, std::int32_t bx, std::int32_t by) const override;
+  void put_block(const BlockKey& key, std::span<const float> heights_m) override;
+  bool has_block(const BlockKey& key) const override;
   void read(const Lattice& lattice, const PostWindow& window, std::span<float> out) const override {
     read_window(
-        lattice, window, [this](const TileKey& key) { return block_at(key); }, out);
+        lattice, window, [this](const BlockKey& key) { return block_at(key); }, out);
   }
   void seal() override { write_segment(When::kAlways); }
   std::int64_t memory_bytes() const override;
@@ -73,16 +72,16 @@ class Hdf5LatticeStore final : public LatticeStore {
   static std::int64_t bytes_of(const PackedBlock& block) {
     return static_cast<std::int64_t>(sizeof(PackedBlock) + block.chunk.size());
   }
-  bool is_known(const TileKey& key) const;
+  bool is_known(const BlockKey& key) const;
   void add_pending(std::shared_ptr<const PackedBlock> block);
   bool is_full() const;
   std::vector<Pending> take_batch(When when);
   void write_segment(When when);
   void settle(const std::vector<Pending>& batch, const std::vector<SegmentEntry>& entries);
-  BlockHeights block_at(const TileKey& key) const;
-  BlockHeights unpack(const TileKey& key, std::span<const std::uint8_t> chunk,
+  BlockHeights block_at(const BlockKey& key) const;
+  BlockHeights unpack(const BlockKey& key, std::span<const std::uint8_t> chunk,
                       const fs::path& from) const;
-  BlockHeights load_block(const TileKey& key, const Stored& stored) const;
+  BlockHeights load_block(const BlockKey& key, const Stored& stored) const;
 
   const fs::path folder_;
   const TilingScheme scheme_;
@@ -96,8 +95,8 @@ class Hdf5LatticeStore final : public LatticeStore {
 
   mutable std::shared_mutex mutex_;
   std::uint64_t last_version_ = 0;
-  std::unordered_map<TileKey, Pending, TileKeyHash> pending_;
-  std::unordered_map<TileKey, Stored, TileKeyHash> stored_;
+  std::unordered_map<BlockKey, Pending, TileKeyHash> pending_;
+  std::unordered_map<BlockKey, Stored, TileKeyHash> stored_;
   std::int64_t pending_bytes_ = 0;
   // The part of pending_ that is just being written.
   std::int64_t writing_bytes_ = 0;
@@ -147,7 +146,7 @@ std::optional<Error> Hdf5LatticeStore::load_segment(std::int32_t number) {
 }
 
 // REQUIRES: mutex_ is held.
-bool Hdf5LatticeStore::is_known(const TileKey& key) const {
+bool Hdf5LatticeStore::is_known(const BlockKey& key) const {
   return pending_.contains(key) || stored_.contains(key);
 }
 
@@ -165,9 +164,7 @@ void Hdf5LatticeStore::add_pending(std::shared_ptr<const PackedBlock> block) {
   slot = {.version = ++last_version_, .block = std::move(block)};
 }
 
-void Hdf5LatticeStore::put_block(std::int32_t zoom, std::int32_t bx, std::int32_t by,
-                                 std::span<const float> heights_m) {
-  const TileKey key = {.zoom = zoom, .x = bx, .y = by};
+void Hdf5LatticeStore::put_block(const BlockKey& key, std::span<const float> heights_m) {
   QMPIPE_CHECK(heights_m.size() == kBlockSize && is_block_of(scheme_, options_.max_zoom, key));
   const bool is_void = is_all_void(heights_m);
   auto block = std::make_shared<PackedBlock>();
@@ -186,8 +183,7 @@ void Hdf5LatticeStore::put_block(std::int32_t zoom, std::int32_t bx, std::int32_
   if (full) write_segment(When::kFull);
 }
 
-bool Hdf5LatticeStore::has_block(std::int32_t zoom, std::int32_t bx, std::int32_t by) const {
-  const TileKey key = {.zoom = zoom, .x = bx, .y = by};
+bool Hdf5LatticeStore::has_block(const BlockKey& key) const {
   const std::shared_lock lock(mutex_);
   const auto it = pending_.find(key);
   return it != pending_.end() ? !it->second.block->chunk.empty() : stored_.contains(key);
@@ -224,7 +220,7 @@ void Hdf5LatticeStore::settle(const std::vector<Pending>& batch,
                               const std::vector<SegmentEntry>& entries) {
   const std::scoped_lock lock(mutex_);
   for (std::size_t k = 0; k < batch.size(); ++k) {
-    const TileKey& key = batch[k].block->key;
+    const BlockKey& key = batch[k].block->key;
     if (entries[k].chunk.bytes == 0) {
       stored_.erase(key);
     } else {
@@ -241,7 +237,7 @@ void Hdf5LatticeStore::settle(const std::vector<Pending>& batch,
   }
 }
 
-BlockHeights Hdf5LatticeStore::unpack(const TileKey& key, std::span<const std::uint8_t> chunk,
+BlockHeights Hdf5LatticeStore::unpack(const BlockKey& key, std::span<const std::uint8_t> chunk,
                                       const fs::path& from) const {
   Result<std::vector<float>> heights_m = codec_.decompress(chunk);
   if (!heights_m) {
@@ -251,7 +247,7 @@ BlockHeights Hdf5LatticeStore::unpack(const TileKey& key, std::span<const std::u
   return std::make_shared<const std::vector<float>>(std::move(*heights_m));
 }
 
-BlockHeights Hdf5LatticeStore::load_block(const TileKey& key, const Stored& stored) const {
+BlockHeights Hdf5LatticeStore::load_block(const BlockKey& key, const Stored& stored) const {
   const fs::path path = segment_path(folder_, SegmentKind::kLattice, stored.segment);
   const auto chunk = read_file_range(path, stored.chunk.offset, stored.chunk.bytes);
   const bool is_damaged = chunk && content_hash(key, *chunk) != stored.content_hash;
@@ -263,7 +259,7 @@ BlockHeights Hdf5LatticeStore::load_block(const TileKey& key, const Stored& stor
   return unpack(key, *chunk, path);
 }
 
-BlockHeights Hdf5LatticeStore::block_at(const TileKey& key) const {
+BlockHeights Hdf5LatticeStore::block_at(const BlockKey& key) const {
   std::shared_ptr<const PackedBlock> pending;
   Stored stored;
   {
@@ -307,6 +303,10 @@ Result<std::unique_ptr<LatticeStore>> open_hdf5_lattice_store(const fs::path& fo
     if (const auto error = store->load_segment(number)) return *error;
   }
   return std::unique_ptr<LatticeStore>(std::move(store));
+}
+
+std::int64_t lattice_store_memory_bytes(const Hdf5LatticeOptions& options, std::int64_t blocks) {
+  return 3 * options.segment_bytes + options.cache_bytes + blocks * kIndexEntryBytes;
 }
 
 std::int32_t count_lattice_segments(const fs::path& folder) {

@@ -41,6 +41,9 @@ Result<std::unique_ptr<LatticeStore>> open_hdf5_lattice_store(const std::filesys
                                                               const TilingScheme& scheme,
                                                               const Hdf5LatticeOptions& options);
 
+// What a store of so many blocks takes in memory at most.
+std::int64_t lattice_store_memory_bytes(const Hdf5LatticeOptions& options, std::int64_t blocks);
+
 // How many segments `folder` holds: for a journal, so that a resumed run notices when the last ones
 // are gone, which the store itself cannot. Throws IoError when the folder cannot be listed.
 std::int32_t count_lattice_segments(const std::filesystem::path& folder);

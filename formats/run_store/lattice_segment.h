@@ -18,6 +18,7 @@
 
 #include "formats/bytes/result.h"
 #include "formats/bytes/seal.h"
+#include "scheduler/block_key.h"
 #include "scheduler/tiling_scheme.h"
 
 namespace qmpipe {
@@ -27,13 +28,13 @@ inline constexpr std::int32_t kSegmentFormatVersion = 1;
 inline constexpr std::size_t kMaxSegmentBlocks = 1U << 16U;
 
 struct PackedBlock {
-  TileKey key;
+  BlockKey key;
   std::vector<std::uint8_t> chunk;  // empty: all void
   std::uint64_t content_hash = 0;
 };
 
 struct SegmentEntry {
-  TileKey key;
+  BlockKey key;
   ByteRange chunk;  // no bytes: all void
   std::uint64_t content_hash = 0;
 };
@@ -43,7 +44,7 @@ struct EncodedSegment {
   std::vector<SegmentEntry> entries;
 };
 
-std::uint64_t content_hash(const TileKey& key, std::span<const std::uint8_t> chunk);
+std::uint64_t content_hash(const BlockKey& key, std::span<const std::uint8_t> chunk);
 
 // Builds the file in memory, so that only our own code meets a full disk. `path` appears in
 // messages, and no other thread may encode under the same one.

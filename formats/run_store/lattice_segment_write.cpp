@@ -9,7 +9,7 @@
 #include "scheduler/check.h"
 
 namespace qmpipe {
-std::uint64_t content_hash(const TileKey& key, std::span<const std::uint8_t> chunk) {
+std::uint64_t content_hash(const BlockKey& key, std::span<const std::uint8_t> chunk) {
   return hash64(chunk, packed(key));
 }
 

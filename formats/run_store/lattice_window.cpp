@@ -32,7 +32,7 @@ void copy_run(const std::vector<float>& block, const BlockRun& run, const PostWi
 
 }  // namespace
 
-bool is_block_of(const TilingScheme& scheme, std::int32_t max_zoom, const TileKey& block) {
+bool is_block_of(const TilingScheme& scheme, std::int32_t max_zoom, const BlockKey& block) {
   return block.zoom >= 0 && block.zoom <= max_zoom && block.x >= 0 &&
          block.x < scheme.columns(block.zoom) && block.y >= 0 && block.y <= scheme.rows(block.zoom);
 }
@@ -42,7 +42,7 @@ bool is_all_void(std::span<const float> heights_m) {
 }
 
 void read_window(const Lattice& lattice, const PostWindow& window,
-                 const std::function<BlockHeights(const TileKey&)>& block_at,
+                 const std::function<BlockHeights(const BlockKey&)>& block_at,
                  std::span<float> out) {
   QMPIPE_CHECK(out.size() == window.size());
   std::fill(out.begin(), out.end(), std::numeric_limits<float>::quiet_NaN());

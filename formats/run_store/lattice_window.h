@@ -11,20 +11,18 @@
 
 namespace qmpipe {
 
-inline constexpr std::size_t kBlockSize =
-    static_cast<std::size_t>(kBlockPosts) * static_cast<std::size_t>(kBlockPosts);
-
 // 256 x 256 heights; null for a block that is all void.
 using BlockHeights = std::shared_ptr<const std::vector<float>>;
 
 // Whether a store of this scheme and depth has the block: rows reach one beyond the tiles'.
-bool is_block_of(const TilingScheme& scheme, std::int32_t max_zoom, const TileKey& block);
+bool is_block_of(const TilingScheme& scheme, std::int32_t max_zoom, const BlockKey& block);
 
 bool is_all_void(std::span<const float> heights_m);
 
 // LatticeStore::read() in terms of whole blocks. `block_at` is asked once for every run of posts
 // inside one block, row of blocks by row of blocks from the south; what it throws comes out.
 void read_window(const Lattice& lattice, const PostWindow& window,
-                 const std::function<BlockHeights(const TileKey&)>& block_at, std::span<float> out);
+                 const std::function<BlockHeights(const BlockKey&)>& block_at,
+                 std::span<float> out);
 
 }  // namespace qmpipe

@@ -15,9 +15,7 @@ class MemoryLatticeStore final : public LatticeStore {
   MemoryLatticeStore(TilingScheme scheme, std::int32_t max_zoom)
       : scheme_(scheme), max_zoom_(max_zoom) {}
 
-  void put_block(std::int32_t zoom, std::int32_t bx, std::int32_t by,
-                 std::span<const float> heights_m) override {
-    const TileKey key = {.zoom = zoom, .x = bx, .y = by};
+  void put_block(const BlockKey& key, std::span<const float> heights_m) override {
     QMPIPE_CHECK(heights_m.size() == kBlockSize && is_block_of(scheme_, max_zoom_, key));
     if (is_all_void(heights_m)) {
       const std::scoped_lock lock(mutex_);
@@ -29,13 +27,11 @@ class MemoryLatticeStore final : public LatticeStore {
     blocks_.insert_or_assign(key, std::move(block));
   }
 
-  bool has_block(std::int32_t zoom, std::int32_t bx, std::int32_t by) const override {
-    return find({.zoom = zoom, .x = bx, .y = by}) != nullptr;
-  }
+  bool has_block(const BlockKey& key) const override { return find(key) != nullptr; }
 
   void read(const Lattice& lattice, const PostWindow& window, std::span<float> out) const override {
     read_window(
-        lattice, window, [this](const TileKey& key) { return find(key); }, out);
+        lattice, window, [this](const BlockKey& key) { return find(key); }, out);
   }
 
   void seal() override {}
@@ -46,7 +42,7 @@ class MemoryLatticeStore final : public LatticeStore {
   }
 
  private:
-  BlockHeights find(const TileKey& key) const {
+  BlockHeights find(const BlockKey& key) const {
     const std::shared_lock lock(mutex_);
     const auto it = blocks_.find(key);
     return it == blocks_.end() ? nullptr : it->second;
@@ -55,7 +51,7 @@ class MemoryLatticeStore final : public LatticeStore {
   TilingScheme scheme_;
   std::int32_t max_zoom_;
   mutable std::shared_mutex mutex_;
-  std::unordered_map<TileKey, BlockHeights, TileKeyHash> blocks_;
+  std::unordered_map<BlockKey, BlockHeights, TileKeyHash> blocks_;
 };
 
 }  // namespace

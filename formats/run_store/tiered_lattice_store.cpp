@@ -11,12 +11,11 @@ class TieredLatticeStore final : public LatticeStore {
                      std::unique_ptr<LatticeStore> deep)
       : coarse_(std::move(coarse)), deep_(std::move(deep)), last_coarse_zoom_(last_coarse_zoom) {}
 
-  void put_block(std::int32_t zoom, std::int32_t bx, std::int32_t by,
-                 std::span<const float> heights_m) override {
-    store_of(zoom).put_block(zoom, bx, by, heights_m);
+  void put_block(const BlockKey& block, std::span<const float> heights_m) override {
+    store_of(block.zoom).put_block(block, heights_m);
   }
-  bool has_block(std::int32_t zoom, std::int32_t bx, std::int32_t by) const override {
-    return store_of(zoom).has_block(zoom, bx, by);
+  bool has_block(const BlockKey& block) const override {
+    return store_of(block.zoom).has_block(block);
   }
   void read(const Lattice& lattice, const PostWindow& window, std::span<float> out) const override {
     store_of(lattice.zoom()).read(lattice, window, out);

@@ -51,7 +51,7 @@ void require_a_zoom(const BuildOptions& options, std::int32_t deepest_zoom) {
 }
 
 // Reducing is what makes coarse posts right, so a smaller --max-zoom does not spare it.
-void note_sampling(const SurveyOptions& survey, const std::vector<RasterInfo>& sources,
+void note_sampling(const SurveyChoice& survey, const std::vector<RasterInfo>& sources,
                    Progress& progress) {
   const std::int32_t zoom = chosen_sampling_zoom(survey, sources);
   if (survey.max_zoom < 0 || survey.max_zoom >= zoom) return;
@@ -185,30 +185,25 @@ MemoryRequest memory_request(const BuildOptions& options) {
 }
 
 // A zoom that an earlier run has on disk stays there, however much memory there is now.
-MemoryShare share_for(const BuildOptions& options, const SurveyOptions& survey,
-                      const std::vector<RasterInfo>& sources, const RunPlace& place) {
-  MemoryRequest request = memory_request(options);
-  if (place.record != nullptr) {
-    request.deepest_memory_zoom =
-        place.record->coarsest_on_disk(chosen_sampling_zoom(survey, sources)) - 1;
-  }
-  return share_memory(request, survey, sources);
+MemoryShare share_for(const MemoryDivisions& divisions, std::int32_t sampling_zoom,
+                      const RunPlace& place) {
+  if (place.record == nullptr) return divisions.best();
+  return divisions.best(place.record->coarsest_on_disk(sampling_zoom) - 1);
 }
 
-void place_store(SurveyOptions& survey, const MemoryShare& share, const BuildOptions& options,
-                 RunPlace& place, Progress& progress) {
-  survey.record = place.record.get();
-  survey.keep_after_s = options.run.checkpoint_s;
-  if (share.store_bytes == 0) return;
-  survey.last_memory_zoom = share.last_memory_zoom;
-  survey.block_cache_bytes = share.block_cache_bytes;
+SurveyPlace survey_place(const BuildOptions& options, const MemoryShare& memory, RunPlace& place,
+                         Progress& progress) {
+  SurveyPlace survey = {.record = place.record.get(), .keep_after_s = options.run.checkpoint_s};
+  if (memory.store_bytes == 0) return survey;
   if (place.record == nullptr) place.scratch = std::make_unique<ScratchFolder>(run_folder(options));
   survey.store_folder = place.record != nullptr ? place.record->folder() : place.scratch->path();
-  const std::string which = share.last_memory_zoom < 0 ? ""
-                                                       : fmt::format(" of the zooms deeper than {}",
-                                                                     share.last_memory_zoom);
+  const std::string which =
+      memory.last_memory_zoom < 0
+          ? ""
+          : fmt::format(" of the zooms deeper than {}", memory.last_memory_zoom);
   progress.note(fmt::format("the lattice{} is kept in {}: at most {} of disk", which,
-                            survey.store_folder.string(), bytes_text(share.store_bytes)));
+                            survey.store_folder.string(), bytes_text(memory.store_bytes)));
+  return survey;
 }
 
 // The folder that is there once the sink is open, on the disk that the tiles go to.
@@ -231,19 +226,25 @@ void note_estimate(const BuildOptions& options, const Estimate& estimate, Progre
   }
 }
 
-BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey,
-                           const std::vector<RasterInfo>& sources, RunPlace& place,
+// What is known of a build before anything is made on disk.
+struct Groundwork {
+  SurveyChoice choice;
+  std::vector<RasterInfo> sources;
+  MemoryDivisions divisions;
+};
+
+BuildResult build_in_place(const BuildOptions& options, const Groundwork& ground, RunPlace& place,
                            Progress& progress) {
-  const MemoryShare share = share_for(options, to_survey, sources, place);
-  const MemoryPlan& memory = share.plan;
+  const MemoryShare memory =
+      share_for(ground.divisions, chosen_sampling_zoom(ground.choice, ground.sources), place);
   set_gdal_cache_bytes(kGdalCacheBytes);
-  to_survey.source_cache_bytes = memory.source_cache_bytes;
-  to_survey.threads = memory.sampling_threads;
   const std::unique_ptr<TileSink> sink = open_sink(options, place);
-  place_store(to_survey, share, options, place, progress);
-  const Survey survey = run_survey(to_survey, sources, progress);
+  const SurveyPlace survey_in = survey_place(options, memory, place, progress);
+  const auto tally = std::make_shared<HeightTally>(options.input.guard);
+  const Survey survey =
+      run_survey(ground.choice, memory, survey_in, ground.sources, tally, progress);
   give_back_freed_memory();
-  note_findings(*to_survey.tally, to_survey.heights, progress);
+  note_findings(*tally, ground.choice.heights, progress);
   require_data(survey);
   const BuildPlan plan = plan_build(options, survey);
   for (const std::string& note : plan.notes) progress.note(note);
@@ -251,17 +252,18 @@ BuildResult build_in_place(const BuildOptions& options, SurveyOptions& to_survey
                                 survey.pole_heights);
   BuildResult result;
   result.recipe = plan.recipe;
-  result.estimate = keeping_survey(to_survey, survey, progress, [&] {
-    return estimate_build(options, survey, plan, heightfield, memory, progress);
+  result.estimate = keeping_survey(survey, memory, survey_in, progress, [&] {
+    return estimate_build(options, survey, plan, heightfield, memory.plan, progress);
   });
-  result.estimate.store_bytes = share.store_bytes;
+  result.estimate.store_bytes = memory.store_bytes;
   progress.event(estimate_json(result.estimate));
   if (options.run.dry_run) return result;
   note_estimate(options, result.estimate, progress);
 
   progress.correct(mesh_phase(result.estimate));
-  result.report = keeping_survey(to_survey, survey, progress, [&] {
-    return run_mesh_pass(options, plan, heightfield, memory, *sink, place.record.get(), progress);
+  result.report = keeping_survey(survey, memory, survey_in, progress, [&] {
+    return run_mesh_pass(options, plan, heightfield, memory.plan, *sink, place.record.get(),
+                         progress);
   });
   result.report.source_reads = survey.source_reads;
   result.report.survey_s = survey.seconds;
@@ -313,11 +315,10 @@ std::optional<FinishedSet> found_set(const BuildOptions& options) {
 
 }  // namespace
 
-SurveyOptions survey_options(const BuildOptions& options) {
+SurveyChoice survey_choice(const BuildOptions& options) {
   return {.inputs = options.input.paths,
           .source_crs = options.input.source_crs,
           .heights = options.input.heights,
-          .tally = std::make_shared<HeightTally>(options.input.guard),
           .resampling = options.input.resampling,
           .reduction = options.mesh.reduction,
           .scheme = TilingScheme(options.mesh.projection),
@@ -331,24 +332,27 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   require_sound(options);
   const tbb::global_control workers(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(options.run.threads));
-  SurveyOptions to_survey = survey_options(options);
-  const std::vector<RasterInfo> sources = describe_inputs(to_survey);
+  const SurveyChoice choice = survey_choice(options);
+  const std::vector<RasterInfo> sources = describe_inputs(choice);
   if (auto set = found_set(options)) {
     BuildResult result;
     result.found = std::move(set);
     return result;
   }
-  require_a_zoom(options, options.mesh.max_zoom.value_or(chosen_sampling_zoom(to_survey, sources)));
+  require_a_zoom(options, options.mesh.max_zoom.value_or(chosen_sampling_zoom(choice, sources)));
   note_sources(sources, progress);
   note_grids(sources, progress);
-  note_sampling(to_survey, sources, progress);
-  progress.expect(phases_of_build(options, to_survey, sources));
+  note_sampling(choice, sources, progress);
+  progress.expect(phases_of_build(options, choice, sources));
   // Refuses what cannot work before anything is made on disk.
-  share_memory(memory_request(options), to_survey, sources);
+  const Groundwork ground = {
+      .choice = choice,
+      .sources = sources,
+      .divisions = MemoryDivisions(memory_request(options), choice, sources)};
   const std::vector<std::filesystem::path> made = missing_folders(options.output.path);
   RunPlace place = open_place(options, progress);
   try {
-    BuildResult result = build_in_place(options, to_survey, sources, place, progress);
+    BuildResult result = build_in_place(options, ground, place, progress);
     if (place.record != nullptr) place.record->finish(options.run.keep_run);
     return result;
   } catch (const Interrupted& interrupted) {

@@ -27,7 +27,7 @@ struct BuildResult {
 };
 
 // What its survey is asked for.
-SurveyOptions survey_options(const BuildOptions& options);
+SurveyChoice survey_choice(const BuildOptions& options);
 
 BuildResult build_pyramid(const BuildOptions& options, Progress& progress);
 

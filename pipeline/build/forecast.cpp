@@ -16,7 +16,7 @@ double cores_of(std::int32_t threads) { return std::max(1, std::min(threads, usa
 
 }  // namespace
 
-std::int64_t expected_tiles(const BuildOptions& options, const SurveyOptions& survey,
+std::int64_t expected_tiles(const BuildOptions& options, const SurveyChoice& survey,
                             const std::vector<RasterInfo>& sources) {
   const std::int32_t deepest =
       options.mesh.max_zoom.value_or(chosen_sampling_zoom(survey, sources));
@@ -27,7 +27,7 @@ std::int64_t expected_tiles(const BuildOptions& options, const SurveyOptions& su
   return tiles;
 }
 
-std::vector<ExpectedPhase> phases_of_build(const BuildOptions& options, const SurveyOptions& survey,
+std::vector<ExpectedPhase> phases_of_build(const BuildOptions& options, const SurveyChoice& survey,
                                            const std::vector<RasterInfo>& sources) {
   const std::int64_t tiles = expected_tiles(options, survey, sources);
   const double tile_s = usual_tile_s(options.mesh.method) / cores_of(options.run.threads);

@@ -13,12 +13,12 @@
 namespace qmpipe {
 
 // How many tiles a build makes, about.
-std::int64_t expected_tiles(const BuildOptions& options, const SurveyOptions& survey,
+std::int64_t expected_tiles(const BuildOptions& options, const SurveyChoice& survey,
                             const std::vector<RasterInfo>& sources);
 
 // Those of a build: the survey, of which nothing is known until it works, and meshing by what tiles
 // usually take.
-std::vector<ExpectedPhase> phases_of_build(const BuildOptions& options, const SurveyOptions& survey,
+std::vector<ExpectedPhase> phases_of_build(const BuildOptions& options, const SurveyChoice& survey,
                                            const std::vector<RasterInfo>& sources);
 
 // Meshing, as the estimate found it: zooms differ in what their tiles take.

@@ -28,7 +28,7 @@ BuildOptions build_options_of(const CompareOptions& options, const ComparedChoic
 
 // Of all methods: the time left is that of the whole comparison.
 void expect_phases(const CompareOptions& options, Progress& progress) {
-  const SurveyOptions survey = survey_options(options.build);
+  const SurveyChoice survey = survey_choice(options.build);
   const std::vector<RasterInfo> sources = describe_inputs(survey);
   std::vector<ExpectedPhase> phases;
   for (const ComparedChoice& choice : options.methods) {

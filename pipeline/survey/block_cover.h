@@ -5,21 +5,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "formats/run_store/lattice_store.h"
 #include "formats/sources/raster_source.h"
-#include "scheduler/tile_key.h"
+#include "scheduler/block_key.h"
 
 namespace qmpipe {
-
-// Blocks are named like tiles; row 2^zoom holds the last row of posts.
-using BlockKey = TileKey;
-
-inline PostWindow posts_of(const BlockKey& block) {
-  return {.i0 = first_post_of_block(block.x),
-          .j0 = first_post_of_block(block.y),
-          .width_posts = kBlockPosts,
-          .height_posts = kBlockPosts};
-}
 
 // Columns first_x .. first_x + width - 1 (they wrap) and rows first_y .. first_y + height - 1.
 struct BlockSpan {

@@ -22,10 +22,10 @@ void copy_blocks(const Survey& survey, const std::vector<BlockKey>& blocks, std:
   arena.execute([&] {
     tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t k) {
       const BlockKey& block = blocks[k];
-      if (!survey.store->has_block(block.zoom, block.x, block.y)) return;
+      if (!survey.store->has_block(block)) return;
       std::vector<float> heights_m(kBlockSize);
       survey.store->read(Lattice(survey.scheme, block.zoom), posts_of(block), heights_m);
-      disk.put_block(block.zoom, block.x, block.y, heights_m);
+      disk.put_block(block, heights_m);
     });
   });
   disk.seal();
@@ -34,13 +34,12 @@ void copy_blocks(const Survey& survey, const std::vector<BlockKey>& blocks, std:
 // One store at a time may use the folder: the one that is at work there, or a new one.
 class DiskStore {
  public:
-  DiskStore(const SurveyOptions& options, const Survey& survey) : store_(survey.disk) {
+  DiskStore(const Survey& survey, const std::filesystem::path& folder) : store_(survey.disk) {
     if (store_ != nullptr) return;
-    auto opened = open_hdf5_lattice_store(options.record->folder(), survey.scheme,
-                                          {.max_zoom = survey.sampling_zoom});
+    auto opened =
+        open_hdf5_lattice_store(folder, survey.scheme, {.max_zoom = survey.sampling_zoom});
     if (!opened) {
-      throw IoError("cannot keep the survey in", options.record->folder().string(),
-                    opened.error().message, "");
+      throw IoError("cannot keep the survey in", folder.string(), opened.error().message, "");
     }
     own_ = std::move(opened.value());
     store_ = own_.get();
@@ -57,27 +56,28 @@ std::int32_t last_kept(const Survey& survey) {
   return std::min(survey.coarsest_done, survey.sampling_zoom);
 }
 
-void write_zooms(const SurveyOptions& options, const Survey& survey) {
-  const DiskStore disk(options, survey);
+void write_zooms(const Survey& survey, const MemoryShare& memory, RunRecord& record) {
+  const DiskStore disk(survey, record.folder());
   std::vector<BlockKey> blocks =
       covered_blocks(survey.scheme, survey.sampling_zoom, survey.sources);
   for (std::int32_t zoom = survey.sampling_zoom; zoom >= last_kept(survey); --zoom) {
     if (zoom < survey.sampling_zoom) blocks = coarser_blocks(survey.scheme, blocks);
-    if (zoom > options.last_memory_zoom) continue;
-    copy_blocks(survey, blocks, options.threads, disk.store());
-    if (zoom >= survey.coarsest_done) options.record->add_surveyed(zoom, zoom_of(survey, zoom));
+    if (zoom > memory.last_memory_zoom) continue;
+    copy_blocks(survey, blocks, memory.plan.sampling_threads, disk.store());
+    if (zoom >= survey.coarsest_done) record.add_surveyed(zoom, zoom_of(survey, zoom));
   }
 }
 
 }  // namespace
 
-void keep_survey(const SurveyOptions& options, const Survey& survey, Progress& progress) {
-  const bool is_on_disk = options.last_memory_zoom < last_kept(survey);
-  if (options.record == nullptr || is_on_disk || survey.seconds < options.keep_after_s) return;
+void keep_survey(const Survey& survey, const MemoryShare& memory, const SurveyPlace& place,
+                 Progress& progress) {
+  const bool is_on_disk = memory.last_memory_zoom < last_kept(survey);
+  if (place.record == nullptr || is_on_disk || survey.seconds < place.keep_after_s) return;
   progress.note(fmt::format("keeping the survey, which took {}: ask again to stop without it",
                             duration_text(survey.seconds)));
   try {
-    write_zooms(options, survey);
+    write_zooms(survey, memory, *place.record);
   } catch (const IoError& error) {
     progress.note(fmt::format("the survey is not kept: {}", error.what()));
   }

@@ -10,7 +10,6 @@
 #include "formats/bytes/errors.h"
 #include "formats/mbtiles/mbtiles.h"
 #include "formats/run_store/hdf5_lattice_store.h"
-#include "formats/sources/source_pool.h"
 #include "pipeline/common/process_memory.h"
 #include "pipeline/survey/block_cover.h"
 #include "pipeline/survey/sampling_order.h"
@@ -18,12 +17,9 @@
 namespace qmpipe {
 namespace {
 
-constexpr std::int64_t kBlockBytes =
-    std::int64_t{kBlockPosts} * kBlockPosts * static_cast<std::int64_t>(sizeof(float));
-// The index of the store on disk.
-constexpr std::int64_t kIndexBytesPerBlock = 112;
+constexpr auto kBlockBytes = static_cast<std::int64_t>(kBlockSize * sizeof(float));
 
-MemoryNeeds needs_of(const SurveyOptions& survey, const std::vector<RasterInfo>& sources,
+MemoryNeeds needs_of(const SurveyChoice& survey, const std::vector<RasterInfo>& sources,
                      std::int64_t limit_bytes) {
   MemoryNeeds needs{.threads = survey.threads};
   // Every thread has its own handles, on as many sources at a time as it may have open.
@@ -57,8 +53,7 @@ std::int64_t lattice_memory(const std::vector<std::int64_t>& blocks, std::int32_
     }
   }
   if (on_disk == 0) return bytes;
-  const Hdf5LatticeOptions store;
-  return bytes + 3 * store.segment_bytes + store.cache_bytes + on_disk * kIndexBytesPerBlock;
+  return bytes + lattice_store_memory_bytes({}, on_disk);
 }
 
 // So many rows of blocks do tiles touch between the first and the last time a block is read: the
@@ -84,68 +79,71 @@ void widen_block_cache(MemoryShare& share, std::int64_t limit_bytes, std::int64_
   share.plan.expected_peak_bytes += share.block_cache_bytes - least_bytes;
 }
 
-struct Division {
-  MemoryShare share;
-  std::int64_t lattice_bytes = 0;
-};
-
-// The most of the lattice in memory that leaves the source its cache: a lattice on disk is packed
-// once, but strips that the cache cannot hold are unpacked for every block of posts.
-// REQUIRES: divisions, most of the lattice in memory first.
-MemoryShare choose(const std::vector<Division>& divisions, std::int64_t limit_bytes,
-                   std::int64_t front_bytes) {
-  // Half the front is a row of strips; what comes on top keeps threads from pushing each other out.
-  for (const std::int64_t cache_bytes : {front_bytes, front_bytes / 8 * 5, std::int64_t{0}}) {
-    for (const Division& division : divisions) {
-      if (division.lattice_bytes <= limit_bytes / 2 &&
-          division.share.plan.source_cache_bytes >= cache_bytes) {
-        return division.share;
-      }
-    }
-  }
-  return divisions.front().share;
-}
-
 }  // namespace
 
-MemoryShare share_memory(const MemoryRequest& request, const SurveyOptions& survey,
-                         const std::vector<RasterInfo>& sources) {
-  const std::int64_t limit = memory_limit_bytes(request.limit_bytes);
-  const std::int32_t sampling_zoom = chosen_sampling_zoom(survey, sources);
-  MemoryNeeds needs = needs_of(survey, sources, limit);
+MemoryDivisions::MemoryDivisions(const MemoryRequest& request, const SurveyChoice& choice,
+                                 const std::vector<RasterInfo>& sources)
+    : limit_bytes_(memory_limit_bytes(request.limit_bytes)),
+      is_limit_given_(request.limit_bytes != 0),
+      sampling_zoom_(chosen_sampling_zoom(choice, sources)) {
+  MemoryNeeds needs = needs_of(choice, sources, limit_bytes_);
   needs.simplify_bytes = request.simplify_bytes;
+  front_bytes_ = needs.source_front_bytes;
+  rows_of_blocks_bytes_ = rows_of_blocks_bytes(Lattice(choice.scheme, sampling_zoom_), sources);
   std::vector<std::int64_t> blocks;
-  for (std::int32_t zoom = 0; zoom <= sampling_zoom; ++zoom) {
-    blocks.push_back(expected_blocks(survey.scheme, zoom, sources));
+  for (std::int32_t zoom = 0; zoom <= sampling_zoom_; ++zoom) {
+    blocks.push_back(expected_blocks(choice.scheme, zoom, sources));
     needs.tiles += blocks.back();
   }
   if (request.output == TileForm::kMbtiles) {
     needs.output_bytes = kMbtilesSinkBytes + needs.tiles * kMbtilesSinkBytesPerTile;
   }
 
-  std::vector<Division> divisions;
-  std::int64_t least = std::numeric_limits<std::int64_t>::max();
-  for (std::int32_t last = std::min(sampling_zoom, request.deepest_memory_zoom); last >= -1;
-       --last) {
+  least_limit_bytes_ = std::numeric_limits<std::int64_t>::max();
+  for (std::int32_t last = sampling_zoom_; last >= -1; --last) {
     needs.lattice_bytes = lattice_memory(blocks, last);
-    MemoryShare share{.plan = plan_memory(limit, needs), .last_memory_zoom = last};
-    for (std::int32_t zoom = last + 1; zoom <= sampling_zoom; ++zoom) {
+    MemoryShare share{.plan = plan_memory(limit_bytes_, needs), .last_memory_zoom = last};
+    for (std::int32_t zoom = last + 1; zoom <= sampling_zoom_; ++zoom) {
       share.store_bytes += blocks[static_cast<std::size_t>(zoom)] * kBlockBytes;
     }
-    least = std::min(least, share.plan.smallest_limit_bytes);
-    if (share.plan.fits) divisions.push_back({share, needs.lattice_bytes});
+    least_limit_bytes_ = std::min(least_limit_bytes_, share.plan.smallest_limit_bytes);
+    if (share.plan.fits) divisions_.push_back({share, needs.lattice_bytes});
   }
-  if (!divisions.empty()) {
-    MemoryShare share = choose(divisions, limit, needs.source_front_bytes);
-    const Lattice lattice(survey.scheme, sampling_zoom);
-    widen_block_cache(share, limit, rows_of_blocks_bytes(lattice, sources));
-    return share;
+  if (divisions_.empty()) refuse();
+}
+
+// The most of the lattice in memory that leaves the source its cache: a lattice on disk is packed
+// once, but strips that the cache cannot hold are unpacked for every block of posts.
+const MemoryDivisions::Division& MemoryDivisions::chosen(std::int32_t deepest_memory_zoom) const {
+  const auto first =
+      std::find_if(divisions_.begin(), divisions_.end(), [=](const Division& division) {
+        return division.share.last_memory_zoom <= deepest_memory_zoom;
+      });
+  if (first == divisions_.end()) refuse();
+  // Half the front is a row of strips; what comes on top keeps threads from pushing each other out.
+  for (const std::int64_t cache_bytes : {front_bytes_, front_bytes_ / 8 * 5, std::int64_t{0}}) {
+    for (auto division = first; division != divisions_.end(); ++division) {
+      if (division->lattice_bytes <= limit_bytes_ / 2 &&
+          division->share.plan.source_cache_bytes >= cache_bytes) {
+        return *division;
+      }
+    }
   }
+  return *first;
+}
+
+MemoryShare MemoryDivisions::best(std::int32_t deepest_memory_zoom) const {
+  MemoryShare share = chosen(deepest_memory_zoom).share;
+  widen_block_cache(share, limit_bytes_, rows_of_blocks_bytes_);
+  return share;
+}
+
+void MemoryDivisions::refuse() const {
   throw UsageError(fmt::format(
       "--memory: this work (sampling zoom {}) needs {} MiB or more, and the limit is {} MiB{}; "
       "give more, or less input, or a smaller --max-zoom where it is deeper than the pixels",
-      sampling_zoom, (least + (1LL << 20U) - 1) >> 20U, limit >> 20U,
-      request.limit_bytes == 0 ? " (nine tenths of this machine's memory)" : ""));
+      sampling_zoom_, (least_limit_bytes_ + (1LL << 20U) - 1) >> 20U, limit_bytes_ >> 20U,
+      is_limit_given_ ? "" : " (nine tenths of this machine's memory)"));
 }
 
 }  // namespace qmpipe

@@ -1,14 +1,9 @@
 #include "pipeline/survey/survey.h"
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
-#include <oneapi/tbb/task_group.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -20,10 +15,11 @@
 #include "formats/run_store/hdf5_lattice_store.h"
 #include "formats/run_store/lattice_window.h"
 #include "formats/run_store/tiered_lattice_store.h"
-#include "formats/sources/joined_grids.h"
+#include "formats/sources/source_pool.h"
 #include "pipeline/common/stopwatch.h"
 #include "pipeline/survey/block_cover.h"
 #include "pipeline/survey/data_rim.h"
+#include "pipeline/survey/in_order.h"
 #include "pipeline/survey/keep_survey.h"
 #include "pipeline/survey/sampling_order.h"
 #include "scheduler/check.h"
@@ -31,65 +27,30 @@
 namespace qmpipe {
 namespace {
 
-std::unique_ptr<Sampler> open_sampler(const SurveyOptions& options,
-                                      const std::shared_ptr<const std::vector<RasterInfo>>& sources,
-                                      const std::shared_ptr<SourceBlockCache>& cache) {
-  return std::make_unique<Sampler>(SourcePool(sources,
-                                              {.crs_override = options.source_crs,
-                                               .heights = options.heights,
-                                               .tally = options.tally,
-                                               .cache = cache},
-                                              options.open_sources),
-                                   options.resampling);
-}
-
-// Runs body(k) for 0 <= k < count on the arena's threads, which take one k after the other, so that
-// all work at one place. An exception ends the loop and comes out.
-template <class Body>
-void for_each_in_order(tbb::task_arena& arena, std::int32_t threads, std::size_t count,
-                       const Body& body) {
-  std::atomic<std::size_t> next = 0;
-  const auto take = [&](std::int32_t) {
-    for (std::size_t k = next++; k < count && !tbb::is_current_task_group_canceling(); k = next++) {
-      body(k);
-    }
-  };
-  arena.execute([&] { tbb::parallel_for(0, threads, take, tbb::simple_partitioner()); });
-}
-
-void make_store(const SurveyOptions& options, Survey& survey) {
-  const std::int32_t max_zoom = survey.sampling_zoom;
-  survey.store = make_memory_lattice_store(options.scheme, max_zoom);
-  if (options.last_memory_zoom >= max_zoom) return;
-  auto disk =
-      open_hdf5_lattice_store(options.store_folder, options.scheme,
-                              {.max_zoom = max_zoom, .cache_bytes = options.block_cache_bytes});
-  if (!disk) {
-    throw IoError("cannot keep the lattice in", options.store_folder.string(), disk.error().message,
-                  "remove the folder and run again");
-  }
-  survey.disk = disk->get();
-  survey.store = make_tiered_lattice_store(std::move(survey.store), options.last_memory_zoom,
-                                           std::move(disk.value()));
-}
-
 void keep_present(const LatticeStore& store, std::vector<BlockKey>& blocks) {
-  std::erase_if(blocks, [&store](const BlockKey& block) {
-    return !store.has_block(block.zoom, block.x, block.y);
-  });
+  std::erase_if(blocks, [&store](const BlockKey& block) { return !store.has_block(block); });
 }
 
 class Surveyor {
  public:
-  Surveyor(const SurveyOptions& options, std::vector<RasterInfo> sources, Progress& progress)
-      : options_(options), progress_(progress), arena_(options.threads) {
+  Surveyor(const SurveyChoice& choice, const MemoryShare& memory, const SurveyPlace& place,
+           std::vector<RasterInfo> sources, std::shared_ptr<HeightTally> tally, Progress& progress)
+      : choice_(choice),
+        memory_(memory),
+        place_(place),
+        tally_(std::move(tally)),
+        progress_(progress) {
     survey_.sources = std::move(sources);
   }
 
   Survey run();
 
  private:
-  bool is_on_disk(std::int32_t zoom) const { return zoom > options_.last_memory_zoom; }
+  std::int32_t threads() const { return memory_.plan.sampling_threads; }
+  bool is_on_disk(std::int32_t zoom) const { return zoom > memory_.last_memory_zoom; }
+  void make_store();
+  std::unique_ptr<Sampler> open_sampler(std::shared_ptr<const std::vector<RasterInfo>> sources,
+                                        std::shared_ptr<SourceBlockCache> cache) const;
   bool is_done_already(const BlockKey& block) const;
   bool take_from_record(std::vector<BlockKey>& blocks, std::int32_t zoom);
   void survey_zoom(std::vector<BlockKey>& blocks, std::int32_t zoom);
@@ -104,12 +65,42 @@ class Surveyor {
   std::int64_t count_posts(std::vector<BlockKey> blocks);
   std::int64_t begin_step(std::int32_t zoom, std::size_t count);
 
-  const SurveyOptions& options_;
+  const SurveyChoice& choice_;
+  const MemoryShare& memory_;
+  const SurveyPlace& place_;
+  std::shared_ptr<HeightTally> tally_;
   Progress& progress_;
-  tbb::task_arena arena_;
   Survey survey_;
   std::vector<std::int64_t> posts_of_zoom_;  // at most
 };
+
+std::unique_ptr<Sampler> Surveyor::open_sampler(
+    std::shared_ptr<const std::vector<RasterInfo>> sources,
+    std::shared_ptr<SourceBlockCache> cache) const {
+  return std::make_unique<Sampler>(SourcePool(std::move(sources),
+                                              {.crs_override = choice_.source_crs,
+                                               .heights = choice_.heights,
+                                               .tally = tally_,
+                                               .cache = std::move(cache)},
+                                              choice_.open_sources),
+                                   choice_.resampling);
+}
+
+void Surveyor::make_store() {
+  const std::int32_t max_zoom = survey_.sampling_zoom;
+  survey_.store = make_memory_lattice_store(choice_.scheme, max_zoom);
+  if (memory_.last_memory_zoom >= max_zoom) return;
+  auto disk =
+      open_hdf5_lattice_store(place_.store_folder, choice_.scheme,
+                              {.max_zoom = max_zoom, .cache_bytes = memory_.block_cache_bytes});
+  if (!disk) {
+    throw IoError("cannot keep the lattice in", place_.store_folder.string(), disk.error().message,
+                  "remove the folder and run again");
+  }
+  survey_.disk = disk->get();
+  survey_.store = make_tiered_lattice_store(std::move(survey_.store), memory_.last_memory_zoom,
+                                            std::move(disk.value()));
+}
 
 // By zoom, and in all.
 std::int64_t Surveyor::count_posts(std::vector<BlockKey> blocks) {
@@ -135,17 +126,17 @@ std::int64_t Surveyor::begin_step(std::int32_t zoom, std::size_t count) {
 
 void Surveyor::sample(std::vector<BlockKey>& blocks) {
   const Lattice lattice(survey_.scheme, survey_.sampling_zoom);
-  const auto cache = std::make_shared<SourceBlockCache>(options_.source_cache_bytes);
+  const auto cache = std::make_shared<SourceBlockCache>(memory_.plan.source_cache_bytes);
   // The rest of the survey goes by the order of the keys.
   std::vector<BlockKey> order = blocks;
   sort_for_sampling(
-      order, widest_strip(lattice, survey_.sources, options_.threads, options_.source_cache_bytes));
+      order, widest_strip(lattice, survey_.sources, threads(), memory_.plan.source_cache_bytes));
   const auto sources = std::make_shared<const std::vector<RasterInfo>>(survey_.sources);
   // GDAL's datasets belong to one thread; each opens its own.
   tbb::enumerable_thread_specific<std::unique_ptr<Sampler>> samplers(
-      [&] { return open_sampler(options_, sources, cache); });
+      [&] { return open_sampler(sources, cache); });
   const std::int64_t step = begin_step(survey_.sampling_zoom, order.size());
-  for_each_in_order(arena_, options_.threads, order.size(), [&](std::size_t k) {
+  for_each_in_order(threads(), order.size(), [&](std::size_t k) {
     progress_.check_stop();
     const BlockKey& block = order[k];
     if (is_done_already(block)) {
@@ -157,7 +148,7 @@ void Surveyor::sample(std::vector<BlockKey>& blocks) {
     Sampler& sampler = *samplers.local();
     if (sampler.may_cover(lattice, window)) {
       sampler.sample(lattice, window, heights_m);
-      survey_.store->put_block(block.zoom, block.x, block.y, heights_m);
+      survey_.store->put_block(block, heights_m);
     }
     progress_.advance(step);
   });
@@ -167,7 +158,7 @@ void Surveyor::sample(std::vector<BlockKey>& blocks) {
 
 void Surveyor::reduce_to(std::vector<BlockKey>& blocks, std::int32_t zoom) {
   const std::int64_t step = begin_step(zoom, blocks.size());
-  for_each_in_order(arena_, options_.threads, blocks.size(), [&](std::size_t k) {
+  for_each_in_order(threads(), blocks.size(), [&](std::size_t k) {
     progress_.check_stop();
     const BlockKey& block = blocks[k];
     if (is_done_already(block)) {
@@ -175,9 +166,8 @@ void Surveyor::reduce_to(std::vector<BlockKey>& blocks, std::int32_t zoom) {
       return;
     }
     std::vector<float> heights_m(kBlockSize);
-    reduce_block(*survey_.store, survey_.scheme, block.zoom, block.x, block.y, options_.reduction,
-                 heights_m);
-    survey_.store->put_block(block.zoom, block.x, block.y, heights_m);
+    reduce_block(*survey_.store, survey_.scheme, block, choice_.reduction, heights_m);
+    survey_.store->put_block(block, heights_m);
     progress_.advance(step);
   });
   keep_present(*survey_.store, blocks);
@@ -207,7 +197,7 @@ std::optional<float> Surveyor::settle_pole(const std::vector<BlockKey>& blocks,
     survey_.store->read(lattice, posts_of(block), block_m);
     std::replace_if(
         row, row + kBlockPosts, [](float h) { return !std::isnan(h); }, height_m);
-    survey_.store->put_block(zoom, block.x, block.y, block_m);
+    survey_.store->put_block(block, block_m);
   }
   return height_m;
 }
@@ -260,7 +250,7 @@ void Surveyor::list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom
   auto& tiles = survey_.tiles[static_cast<std::size_t>(zoom)];
   tiles.resize(keys.size());
   const std::int64_t step = begin_step(zoom, keys.size());
-  for_each_in_order(arena_, options_.threads, keys.size(), [&](std::size_t k) {
+  for_each_in_order(threads(), keys.size(), [&](std::size_t k) {
     progress_.check_stop();
     tiles[k] = examine(keys[k]);
     progress_.advance(step);
@@ -271,18 +261,18 @@ void Surveyor::list_tiles(const std::vector<BlockKey>& blocks, std::int32_t zoom
 // By a run that was interrupted while it was at this zoom. Blocks with a pole row are made again:
 // that row may or may not have got its one height. (At the sampling zoom it has one from the start.)
 bool Surveyor::is_done_already(const BlockKey& block) const {
-  if (options_.record == nullptr || !is_on_disk(block.zoom)) return false;
+  if (place_.record == nullptr || !is_on_disk(block.zoom)) return false;
   const Lattice lattice(survey_.scheme, block.zoom);
   const bool has_pole =
       lattice.is_pole_row(0) && (block.y == 0 || block.y == block_of_post(lattice.rows() - 1));
-  return !has_pole && survey_.store->has_block(block.zoom, block.x, block.y);
+  return !has_pole && survey_.store->has_block(block);
 }
 
 // True when an earlier run has finished the zoom.
 bool Surveyor::take_from_record(std::vector<BlockKey>& blocks, std::int32_t zoom) {
-  if (options_.record == nullptr || !is_on_disk(zoom)) return false;
-  if (!options_.record->is_surveyed(zoom)) return false;
-  SurveyedZoom surveyed = options_.record->surveyed(zoom, survey_.scheme);
+  if (place_.record == nullptr || !is_on_disk(zoom)) return false;
+  if (!place_.record->is_surveyed(zoom)) return false;
+  SurveyedZoom surveyed = place_.record->surveyed(zoom, survey_.scheme);
   survey_.pole_heights[static_cast<std::size_t>(zoom)] = surveyed.pole_heights_m;
   if (zoom <= survey_.max_zoom) {
     survey_.tiles[static_cast<std::size_t>(zoom)] = std::move(surveyed.tiles);
@@ -292,9 +282,9 @@ bool Surveyor::take_from_record(std::vector<BlockKey>& blocks, std::int32_t zoom
 }
 
 void Surveyor::write_down(std::int32_t zoom) {
-  if (options_.record == nullptr || !is_on_disk(zoom)) return;
+  if (place_.record == nullptr || !is_on_disk(zoom)) return;
   survey_.store->seal();
-  options_.record->add_surveyed(zoom, zoom_of(survey_, zoom));
+  place_.record->add_surveyed(zoom, zoom_of(survey_, zoom));
 }
 
 void Surveyor::survey_zoom(std::vector<BlockKey>& blocks, std::int32_t zoom) {
@@ -319,10 +309,10 @@ void Surveyor::survey_zoom(std::vector<BlockKey>& blocks, std::int32_t zoom) {
 
 Survey Surveyor::run() {
   const Stopwatch watch;
-  survey_.scheme = options_.scheme;
-  survey_.sampling_zoom = chosen_sampling_zoom(options_, survey_.sources);
-  survey_.max_zoom = options_.max_zoom < 0 ? survey_.sampling_zoom : options_.max_zoom;
-  make_store(options_, survey_);
+  survey_.scheme = choice_.scheme;
+  survey_.sampling_zoom = chosen_sampling_zoom(choice_, survey_.sources);
+  survey_.max_zoom = choice_.max_zoom < 0 ? survey_.sampling_zoom : choice_.max_zoom;
+  make_store();
   survey_.pole_heights.resize(static_cast<std::size_t>(survey_.sampling_zoom) + 1);
   survey_.tiles.resize(static_cast<std::size_t>(survey_.max_zoom) + 1);
 
@@ -337,7 +327,7 @@ Survey Surveyor::run() {
   } catch (const Interrupted&) {
     survey_.store->seal();
     survey_.seconds = watch.seconds();
-    keep_survey(options_, survey_, progress_);
+    keep_survey(survey_, memory_, place_, progress_);
     throw;
   }
   survey_.seconds = watch.seconds();
@@ -353,41 +343,11 @@ SurveyedZoom zoom_of(const Survey& survey, std::int32_t zoom) {
   return surveyed;
 }
 
-std::int32_t chosen_sampling_zoom(const SurveyOptions& options,
-                                  const std::vector<RasterInfo>& sources) {
-  if (options.sampling_zoom >= 0) return options.sampling_zoom;
-  return std::max(sampling_zoom_for(options.scheme, sources), options.max_zoom);
-}
-
-std::vector<RasterInfo> describe_inputs(const SurveyOptions& options) {
-  if (options.inputs.empty()) throw UsageError("no input: name at least one raster");
-  std::vector<RasterInfo> infos(options.inputs.size());
-  // The first input that cannot be used is told, whichever thread met one first.
-  std::vector<std::exception_ptr> errors(infos.size());
-  std::atomic<std::size_t> first_wrong = infos.size();
-  tbb::task_arena arena(options.threads);
-  for_each_in_order(arena, options.threads, infos.size(), [&](std::size_t k) {
-    if (k > first_wrong) return;
-    try {
-      infos[k] = RasterSource::open(options.inputs[k], {.crs_override = options.source_crs,
-                                                        .heights = options.heights})
-                     ->info();
-    } catch (...) {
-      errors[k] = std::current_exception();
-      std::size_t before = first_wrong;
-      while (k < before && !first_wrong.compare_exchange_weak(before, k)) {
-      }
-    }
-  });
-  if (first_wrong < infos.size()) std::rethrow_exception(errors[first_wrong]);
-  join_grids(infos);
-  return infos;
-}
-
-Survey run_survey(const SurveyOptions& options, std::vector<RasterInfo> sources,
+Survey run_survey(const SurveyChoice& choice, const MemoryShare& memory, const SurveyPlace& place,
+                  std::vector<RasterInfo> sources, std::shared_ptr<HeightTally> tally,
                   Progress& progress) {
-  QMPIPE_CHECK(options.threads >= 1);
-  return Surveyor(options, std::move(sources), progress).run();
+  QMPIPE_CHECK(choice.threads >= 1 && memory.plan.sampling_threads >= 1);
+  return Surveyor(choice, memory, place, std::move(sources), std::move(tally), progress).run();
 }
 
 }  // namespace qmpipe

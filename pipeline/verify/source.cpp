@@ -32,9 +32,8 @@ class SurveyedPosts final : public SourcePosts {
         survey_(std::move(survey)),
         heightfield_(*survey_.store, survey_.scheme, recipe_.voids, survey_.pole_heights),
         own_blocks_(covered_blocks(survey_.scheme, survey_.sampling_zoom, survey_.sources)) {
-    std::erase_if(own_blocks_, [this](const BlockKey& block) {
-      return !survey_.store->has_block(block.zoom, block.x, block.y);
-    });
+    std::erase_if(own_blocks_,
+                  [this](const BlockKey& block) { return !survey_.store->has_block(block); });
   }
 
   std::optional<WindowHeights> posts(const TileKey& key) const override {
@@ -170,7 +169,7 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
                                                const TilingScheme& scheme,
                                                const std::optional<Recipe>& recipe,
                                                Progress& progress) {
-  SurveyOptions survey = {.inputs = options.inputs, .source_crs = options.source_crs};
+  SurveyChoice survey = {.inputs = options.inputs, .source_crs = options.source_crs};
   survey.threads = options.threads;
   survey.open_sources = sources_open_at_once(options.threads);
   if (recipe && survey.source_crs.empty()) survey.source_crs = recipe->source_crs;
@@ -184,17 +183,16 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
   survey.scheme = scheme;
   survey.sampling_zoom = recipe->sampling_zoom;
   survey.max_zoom = recipe->max_zoom;
-  const MemoryShare share = share_memory({}, survey, sources);
+  const MemoryShare memory = MemoryDivisions({}, survey, sources).best();
+  SurveyPlace place;
   std::unique_ptr<ScratchFolder> scratch;
-  if (share.store_bytes > 0) {
+  if (memory.store_bytes > 0) {
     scratch = std::make_unique<ScratchFolder>("");
-    survey.last_memory_zoom = share.last_memory_zoom;
-    survey.block_cache_bytes = share.block_cache_bytes;
-    survey.store_folder = scratch->path();
+    place.store_folder = scratch->path();
     progress.note(fmt::format("the lattice is kept in {}: at most {} of disk",
-                              survey.store_folder.string(), bytes_text(share.store_bytes)));
+                              place.store_folder.string(), bytes_text(memory.store_bytes)));
   }
-  Survey surveyed = run_survey(survey, std::move(sources), progress);
+  Survey surveyed = run_survey(survey, memory, place, std::move(sources), nullptr, progress);
   return std::make_unique<SurveyedPosts>(*recipe, std::move(surveyed), std::move(scratch));
 }
 

@@ -62,20 +62,20 @@ float reduced(const Neighbourhood& posts, Reduction reduction) {
 
 }  // namespace
 
-void reduce_block(const LatticeStore& store, const TilingScheme& scheme, std::int32_t zoom,
-                  std::int32_t bx, std::int32_t by, Reduction reduction, std::span<float> out) {
-  QMPIPE_CHECK(out.size() == static_cast<std::size_t>(kBlockPosts) * kBlockPosts);
-  const Lattice finer(scheme, zoom + 1);
-  const Lattice coarse(scheme, zoom);
-  const PostWindow window = {.i0 = 2 * first_post_of_block(bx) - 1,
-                             .j0 = 2 * first_post_of_block(by) - 1,
+void reduce_block(const LatticeStore& store, const TilingScheme& scheme, const BlockKey& block,
+                  Reduction reduction, std::span<float> out) {
+  QMPIPE_CHECK(out.size() == kBlockSize);
+  const Lattice finer(scheme, block.zoom + 1);
+  const Lattice coarse(scheme, block.zoom);
+  const PostWindow window = {.i0 = 2 * first_post_of_block(block.x) - 1,
+                             .j0 = 2 * first_post_of_block(block.y) - 1,
                              .width_posts = 2 * kBlockPosts + 1,
                              .height_posts = 2 * kBlockPosts + 1};
   std::vector<float> heights_m(window.size());
   store.read(finer, window, heights_m);
   for (std::int32_t j = 0; j < kBlockPosts; ++j) {
     float* row = out.data() + static_cast<std::ptrdiff_t>(j) * kBlockPosts;
-    if (!coarse.has_row(first_post_of_block(by) + j)) {
+    if (!coarse.has_row(first_post_of_block(block.y) + j)) {
       std::fill(row, row + kBlockPosts, kVoidHeight);
       continue;
     }

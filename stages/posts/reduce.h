@@ -14,9 +14,8 @@ enum class Reduction {
   kMin,        // lowest of the 3 x 3
 };
 
-// The posts of one block of `zoom` from the store's zoom + 1; void where no post counts.
-// REQUIRES: out.size() == kBlockPosts * kBlockPosts.
-void reduce_block(const LatticeStore& store, const TilingScheme& scheme, std::int32_t zoom,
-                  std::int32_t bx, std::int32_t by, Reduction reduction, std::span<float> out);
+// The block's posts from the store's next zoom; void where no post counts. REQUIRES: out.size() == kBlockSize.
+void reduce_block(const LatticeStore& store, const TilingScheme& scheme, const BlockKey& block,
+                  Reduction reduction, std::span<float> out);
 
 }  // namespace qmpipe

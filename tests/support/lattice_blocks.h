@@ -37,13 +37,6 @@ inline bool same_height(float a, float b) {
                        : std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
 }
 
-inline PostWindow window_of_block(const TileKey& block) {
-  return {.i0 = first_post_of_block(block.x),
-          .j0 = first_post_of_block(block.y),
-          .width_posts = kBlockPosts,
-          .height_posts = kBlockPosts};
-}
-
 // What a store should hold.
 class BlockModel {
  public:
@@ -76,8 +69,8 @@ class BlockModel {
   std::size_t differences(const LatticeStore& store, const TilingScheme& scheme) const {
     std::size_t count = 0;
     for (const auto& [key, heights_m] : blocks_) {
-      count += differences(store, Lattice(scheme, key.zoom), window_of_block(key));
-      if (store.has_block(key.zoom, key.x, key.y) == is_all_void(heights_m)) ++count;
+      count += differences(store, Lattice(scheme, key.zoom), posts_of(key));
+      if (store.has_block(key) == is_all_void(heights_m)) ++count;
     }
     return count;
   }

@@ -75,7 +75,7 @@ void fill_zoom(LatticeStore& store, const Lattice& lattice, const HeightOf& heig
         const std::int32_t j = by * kBlockPosts + static_cast<std::int32_t>(k / kSide);
         block[k] = lattice.has_row(j) ? height_of(i, j) : std::numeric_limits<float>::quiet_NaN();
       }
-      store.put_block(lattice.zoom(), bx, by, block);
+      store.put_block({.zoom = lattice.zoom(), .x = bx, .y = by}, block);
     }
   }
 }

@@ -168,7 +168,7 @@ TEST(Hdf5BorderStore, SharesItsFolderWithALatticeStore) {
   {
     const auto lattice = open_hdf5_lattice_store(folder.path(), kGeodetic, {.max_zoom = 5});
     ASSERT_TRUE(lattice.ok());
-    (*lattice)->put_block(0, 0, 0, std::vector<float>(std::size_t{256} * 256, 5.0F));
+    (*lattice)->put_block({}, std::vector<float>(std::size_t{256} * 256, 5.0F));
   }
   EXPECT_EQ(count_lattice_segments(folder.path()), 1);
   EXPECT_EQ(count_border_segments(folder.path()), 1);

@@ -28,9 +28,9 @@ using testing::block_of_seed;
 using testing::BlockModel;
 using ::testing::HasSubstr;
 using testing::output_of;
+using testing::posts_of;
 using testing::SmallDisk;
 using testing::TemporaryFolder;
-using testing::window_of_block;
 
 fs::path segment_path(const fs::path& folder, std::int32_t number) {
   return qmpipe::segment_path(folder, SegmentKind::kLattice, number);
@@ -57,7 +57,7 @@ TileKey key_of(std::int32_t n) { return {.zoom = 4, .x = n % 32, .y = n / 32}; }
 
 void put(LatticeStore& store, BlockModel& model, std::int32_t n, const std::vector<float>& block) {
   const TileKey key = key_of(n);
-  store.put_block(key.zoom, key.x, key.y, block);
+  store.put_block(key, block);
   model.put(key, block);
 }
 
@@ -160,7 +160,7 @@ void expect_damage_is_noticed(const fs::path& folder, const BlockModel& model) {
   int noticed = 0;
   for (const auto& [key, heights_m] : model.blocks()) {
     try {
-      ASSERT_EQ(model.differences(**store, Lattice(kGeodetic, key.zoom), window_of_block(key)), 0U);
+      ASSERT_EQ(model.differences(**store, Lattice(kGeodetic, key.zoom), posts_of(key)), 0U);
     } catch (const IoError& error) {
       ++noticed;
       ASSERT_EQ(error.path(), path);

@@ -18,9 +18,9 @@ namespace {
 
 using testing::block_of_seed;
 using testing::BlockModel;
+using testing::posts_of;
 using testing::same_height;
 using testing::TemporaryFolder;
-using testing::window_of_block;
 
 const TilingScheme kGeodetic{Projection::kGeodetic};
 const TilingScheme kMercator{Projection::kMercator};
@@ -71,7 +71,7 @@ TileKey random_block(std::mt19937_64& random, const TilingScheme& scheme, std::i
 
 void put(LatticeStore& store, BlockModel& model, const TileKey& key,
          const std::vector<float>& heights_m) {
-  store.put_block(key.zoom, key.x, key.y, heights_m);
+  store.put_block(key, heights_m);
   model.put(key, heights_m);
 }
 
@@ -122,9 +122,9 @@ TEST_P(AnyLatticeStore, AnAllVoidBlockHidesAnOlderOneBeforeAndAfterSealing) {
 TEST_P(AnyLatticeStore, BlocksThatWereNeverPutTakeNoRoom) {
   const TemporaryFolder folder;
   const auto store = GetParam().make(folder.path(), kMercator, 2);
-  store->put_block(2, 3, 4, kVoidBlock);
+  store->put_block({.zoom = 2, .x = 3, .y = 4}, kVoidBlock);
   store->seal();
-  EXPECT_FALSE(store->has_block(2, 3, 4));
+  EXPECT_FALSE(store->has_block({.zoom = 2, .x = 3, .y = 4}));
   EXPECT_EQ(store->memory_bytes(), 0);
 }
 
@@ -160,7 +160,7 @@ TEST_P(AnyLatticeStore, EightThreadsPutAndReadTheirOwnBlocks) {
   const auto is_right = [&](std::int32_t n) {
     const std::vector<float> expected = block_of_seed(static_cast<std::uint64_t>(n));
     std::vector<float> out(kBlockSize);
-    store->read(Lattice(kGeodetic, kZoom), window_of_block(key_of(n)), out);
+    store->read(Lattice(kGeodetic, kZoom), posts_of(key_of(n)), out);
     return std::equal(out.begin(), out.end(), expected.begin(), same_height);
   };
   std::atomic<int> wrong = 0;
@@ -170,7 +170,7 @@ TEST_P(AnyLatticeStore, EightThreadsPutAndReadTheirOwnBlocks) {
       for (std::int32_t k = 0; k < kBlocksEach; ++k) {
         const std::int32_t n = k * kThreads + t;
         const TileKey key = key_of(n);
-        store->put_block(key.zoom, key.x, key.y, block_of_seed(static_cast<std::uint64_t>(n)));
+        store->put_block(key, block_of_seed(static_cast<std::uint64_t>(n)));
         const std::int32_t earlier = (k / 2) * kThreads + t;
         if (!is_right(n) || !is_right(earlier) || store->memory_bytes() <= 0) ++wrong;
         if (k == kBlocksEach / 2) store->seal();

@@ -12,7 +12,6 @@
 
 #include "formats/bytes/errors.h"
 #include "formats/tile_sets/open_tile_set.h"
-#include "pipeline/survey/memory_share.h"
 #include "pipeline/verify/verify.h"
 #include "tests/support/build_fixture.h"
 #include "tests/support/temporary_folder.h"
@@ -66,41 +65,6 @@ TEST_F(BuildTest, LatticeOnDiskGivesTheSameBytesAndLeavesNothing) {
   EXPECT_GT(result.estimate.store_bytes, 0) << "nothing was kept on disk";
   EXPECT_LE(result.report.expected_peak_bytes, options.run.memory_bytes);
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "on-disk.qmpipe-run"));
-}
-
-TEST(MemoryShare, LessMemoryMovesTheDeepestZoomsToDiskFirst) {
-  RasterInfo source;
-  source.bounds_deg = {.west_deg = -36, .south_deg = 15, .east_deg = 43, .north_deg = 90};
-  source.pixel_deg = 0.01;
-  source.block_width = 256;
-  source.block_height = 256;
-  const SurveyOptions survey;
-  std::int32_t last_before = kMaxZoom;
-  for (const std::int64_t mebibytes : {8192, 2048, 1024, 512, 300}) {
-    const MemoryShare share = share_memory({.limit_bytes = mebibytes << 20U}, survey, {source});
-    EXPECT_LE(share.plan.expected_peak_bytes, mebibytes << 20U);
-    EXPECT_LE(share.last_memory_zoom, last_before);
-    last_before = share.last_memory_zoom;
-  }
-  EXPECT_LT(last_before, chosen_sampling_zoom(survey, {source}));
-  EXPECT_THROW(share_memory({.limit_bytes = 50LL << 20U}, survey, {source}), UsageError);
-}
-
-TEST(MemoryShare, TheLatticeGivesWayToTheStripsOfAWideSource) {
-  RasterInfo source;
-  source.width = 57600;
-  source.height = 2400;
-  source.bounds_deg = {.west_deg = 0, .south_deg = 10, .east_deg = 80, .north_deg = 13.3333};
-  source.pixel_deg = 80.0 / 57600;
-  source.cached_width = source.width;
-  source.cached_height = 1;
-  source.cached_block_bytes = source.width * 2;
-  SurveyOptions survey;
-  survey.threads = 2;
-  const MemoryShare share = share_memory({.limit_bytes = 320LL << 20U}, survey, {source});
-  EXPECT_LT(share.last_memory_zoom, chosen_sampling_zoom(survey, {source}));
-  EXPECT_GE(share.plan.source_cache_bytes, 260 * source.cached_block_bytes);
-  EXPECT_LE(share.plan.expected_peak_bytes, 320LL << 20U);
 }
 
 TEST_F(BuildTest, VerifyFindsNothingInAnyScheme) {

@@ -24,12 +24,13 @@ constexpr int kHeight = 200;
 
 Survey survey_of(const RasterFixture& fixture, Projection projection = Projection::kGeodetic) {
   const TemporaryFolder folder;
-  SurveyOptions options;
-  options.inputs = {file_in(folder, "dem.tif")};
-  write_raster(options.inputs.front(), fixture);
-  options.scheme = TilingScheme(projection);
+  const SurveyChoice choice = {.inputs = {file_in(folder, "dem.tif")},
+                               .scheme = TilingScheme(projection)};
+  write_raster(choice.inputs.front(), fixture);
+  const std::vector<RasterInfo> sources = describe_inputs(choice);
   Progress progress(ProgressStyle::kSilent, nullptr);
-  return run_survey(options, describe_inputs(options), progress);
+  return run_survey(choice, MemoryDivisions({}, choice, sources).best(), {}, sources, nullptr,
+                    progress);
 }
 
 // A ground of hills whose data end at a slanted line and around a hole.

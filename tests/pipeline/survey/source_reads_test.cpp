@@ -34,9 +34,10 @@ Survey survey_of(const std::string& path, std::int32_t threads, std::int64_t cac
   // More threads than the machine has cores, as in a build.
   const tbb::global_control workers(tbb::global_control::max_allowed_parallelism, 8);
   Progress progress(ProgressStyle::kSilent, nullptr);
-  const SurveyOptions options{
-      .inputs = {path}, .threads = threads, .source_cache_bytes = cache_bytes};
-  return run_survey(options, describe_inputs(options), progress);
+  const SurveyChoice choice{.inputs = {path}, .threads = threads};
+  const MemoryShare memory = {
+      .plan = {.source_cache_bytes = cache_bytes, .sampling_threads = threads}};
+  return run_survey(choice, memory, {}, describe_inputs(choice), nullptr, progress);
 }
 
 std::int64_t comfortable_bytes(const std::string& path, std::int32_t threads) {

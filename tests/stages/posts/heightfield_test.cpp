@@ -39,7 +39,7 @@ float patchy_height_m(std::uint64_t seed, const Lattice& lattice, std::int64_t i
 // Reduces all blocks that may hold data, zoom by zoom.
 void reduce_all(LatticeStore& store, const TilingScheme& scheme, std::int32_t max_zoom,
                 std::set<std::pair<std::int32_t, std::int32_t>> blocks) {
-  std::vector<float> out(static_cast<std::size_t>(kBlockPosts) * kBlockPosts);
+  std::vector<float> out(kBlockSize);
   for (std::int32_t zoom = max_zoom - 1; zoom >= 0; --zoom) {
     std::set<std::pair<std::int32_t, std::int32_t>> coarser;
     const std::int32_t columns = scheme.columns(zoom);
@@ -51,8 +51,8 @@ void reduce_all(LatticeStore& store, const TilingScheme& scheme, std::int32_t ma
       }
     }
     for (const auto& [bx, by] : coarser) {
-      reduce_block(store, scheme, zoom, bx, by, Reduction::kMean, out);
-      store.put_block(zoom, bx, by, out);
+      reduce_block(store, scheme, {.zoom = zoom, .x = bx, .y = by}, Reduction::kMean, out);
+      store.put_block({.zoom = zoom, .x = bx, .y = by}, out);
     }
     blocks = coarser;
   }
@@ -199,7 +199,7 @@ Island make_island(std::mt19937_64& random, const HeightOf& height_of) {
       block[static_cast<std::size_t>((j - by * 256) * 256 + i - bx * 256)] = height_of(i, j);
     }
   }
-  island.world.store->put_block(kZoom, bx, by, block);
+  island.world.store->put_block({.zoom = kZoom, .x = bx, .y = by}, block);
   reduce_all(*island.world.store, kGeodetic, kZoom, {{bx, by}});
   return island;
 }
@@ -341,11 +341,11 @@ TEST(MemoryLatticeStore, BlocksOfVoidsTakeNoRoom) {
   const auto store = make_memory_lattice_store(kGeodetic, 0);
   const std::vector<float> voids(256 * 256, kVoid);
   const std::vector<float> sea(256 * 256, 0.0F);
-  store->put_block(0, 0, 0, voids);
-  EXPECT_FALSE(store->has_block(0, 0, 0));
+  store->put_block({}, voids);
+  EXPECT_FALSE(store->has_block({}));
   EXPECT_EQ(store->memory_bytes(), 0);
-  store->put_block(0, 1, 0, sea);
-  EXPECT_TRUE(store->has_block(0, 1, 0));
+  store->put_block({.zoom = 0, .x = 1, .y = 0}, sea);
+  EXPECT_TRUE(store->has_block({.zoom = 0, .x = 1, .y = 0}));
   EXPECT_EQ(store->memory_bytes(), 256 * 256 * 4);
 }
 

@@ -73,7 +73,7 @@ void expect_zoom_reduced(std::uint64_t seed, const TilingScheme& scheme, std::in
   std::vector<float> out(256 * 256, -1.0F);
   for (std::int32_t by = 0; by <= scheme.rows(zoom); ++by) {
     for (std::int32_t bx = 0; bx < scheme.columns(zoom); ++bx) {
-      reduce_block(*store, scheme, zoom, bx, by, reduction, out);
+      reduce_block(*store, scheme, {.zoom = zoom, .x = bx, .y = by}, reduction, out);
       for (std::int32_t k = 0; k < 256 * 256; ++k) {
         const std::int32_t i = bx * 256 + k % 256;
         const std::int32_t j = by * 256 + k / 256;
@@ -101,10 +101,10 @@ TEST_P(ReduceBy, AConstantStaysItselfAndVoidsStayVoid) {
   const auto store = make_memory_lattice_store(kGeodetic, 1);
   const Lattice fine(kGeodetic, 1);
   std::vector<float> out(256 * 256);
-  reduce_block(*store, kGeodetic, 0, 1, 0, GetParam(), out);
+  reduce_block(*store, kGeodetic, {.zoom = 0, .x = 1, .y = 0}, GetParam(), out);
   EXPECT_TRUE(std::all_of(out.begin(), out.end(), [](float h) { return std::isnan(h); }));
   fill_zoom(*store, fine, [](std::int32_t, std::int32_t) { return -4321.5F; });
-  reduce_block(*store, kGeodetic, 0, 1, 0, GetParam(), out);
+  reduce_block(*store, kGeodetic, {.zoom = 0, .x = 1, .y = 0}, GetParam(), out);
   EXPECT_TRUE(std::all_of(out.begin(), out.end(), [](float h) { return h == -4321.5F; }));
 }
 
@@ -120,7 +120,7 @@ TEST(Reduce, MaximumIsAboveMeanIsAboveMinimum) {
     std::array<std::vector<float>, 4> out;
     for (std::size_t k = 0; k < 4; ++k) {
       out[k].resize(256 * 256);
-      reduce_block(*store, kGeodetic, 0, 0, 0, kReductions[k], out[k]);
+      reduce_block(*store, kGeodetic, {}, kReductions[k], out[k]);
     }
     for (std::size_t k = 0; k < out[0].size(); ++k) {
       if (std::isnan(out[0][k])) continue;
