@@ -4,7 +4,7 @@
 # Safe to run again: what is there is left alone.
 #   tools/setup.sh          what a build and a look at its result need
 #   tools/setup.sh --dev    also what the tests and checks need: a browser, the web servers of
-#                           docs/SERVING.md, other readers of HDF5, groff, clang-format, clang-tidy, the
+#                           docs/SERVING.md, other readers of HDF5, groff, doxygen, clang-format, clang-tidy, the
 #                           fuzzer runtime, valgrind, perf
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -20,7 +20,7 @@ build_packages=(
 )
 dev_packages=(
   chromium nginx-core apache2-bin caddy
-  hdf5-tools python3-h5py python3-zstandard groff-base
+  hdf5-tools python3-h5py python3-zstandard groff-base doxygen
   clang-14 clang-format-14 clang-tidy-14 libclang-rt-14-dev valgrind linux-perf
 )
 
