@@ -9,7 +9,7 @@
 #include "formats/bytes/letter_case.h"
 #include "formats/tile/tile_set.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 namespace {
 
 std::string trimmed(std::string_view text) {
@@ -134,4 +134,4 @@ std::string status_text(const HttpAnswer& answer) {
   return fmt::format("the server answers {}", answer.status);
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

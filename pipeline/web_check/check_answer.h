@@ -12,7 +12,7 @@
 #include "pipeline/web_check/http_answer.h"
 #include "pipeline/web_check/web_address.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 // The page that asks. Where the user named it, what it may not load is a fault and not a warning.
 struct AskingPage {
@@ -36,4 +36,4 @@ bool is_html(std::span<const std::uint8_t> body);
 // "the server answers 404".
 std::string status_text(const HttpAnswer& answer);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 namespace {
 
 std::string range_text(const TileRange& range) {
@@ -178,4 +178,4 @@ void check_available(ServedLayer& layer, AvailableKey key, const WebAddress& url
   AvailableCheck(layer, url, log).run();
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

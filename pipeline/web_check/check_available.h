@@ -7,7 +7,7 @@
 #include "formats/tile/layer_json.h"
 #include "pipeline/web_check/check_layer.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 // Tells the faults and fills layer.available with the ranges that can be used; a layer that lists
 // no tile at all is unusable. Up to kMostRangesCompared ranges, parents are compared exactly.
@@ -20,4 +20,4 @@ std::optional<TileKey> unlisted_parent(const std::vector<TileRange>& children,
                                        const std::vector<TileRange>& parents,
                                        std::int32_t child_zoom);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

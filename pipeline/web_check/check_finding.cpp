@@ -7,7 +7,7 @@
 #include "pipeline/web_check/web_address.h"
 #include "scheduler/check.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 const CheckKindText& text_of(CheckKind kind) {
   const CheckKindText& text = kCheckTexts.at(static_cast<std::size_t>(kind));
@@ -75,4 +75,4 @@ std::vector<CheckFinding> CheckLog::sorted() const {
   return findings;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

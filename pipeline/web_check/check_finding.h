@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 enum class CheckSeverity : std::uint8_t { kFault, kWarning, kHint };
 
@@ -120,4 +120,4 @@ class CheckLog {
   std::vector<CheckFinding> findings_;
 };
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

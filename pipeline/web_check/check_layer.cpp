@@ -11,7 +11,7 @@
 #include "pipeline/web_check/http_answer.h"
 #include "scheduler/check.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 namespace {
 
 // Those that mean something in a layer.json, in TileJSON, or to qmpipe.
@@ -233,4 +233,4 @@ Result<WebAddress> tile_address(const ServedLayer& layer, const WebAddress& fold
                                        {.key = written, .version = layer.parsed.layer.version}));
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

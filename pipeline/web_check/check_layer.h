@@ -12,7 +12,7 @@
 #include "pipeline/web_check/web_address.h"
 #include "scheduler/tiling_scheme.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 struct ServedLayer {
   ParsedLayerJson parsed;
@@ -37,4 +37,4 @@ ServedLayer check_layer_text(const std::string& text, const WebAddress& url, Che
 Result<WebAddress> tile_address(const ServedLayer& layer, const WebAddress& folder,
                                 const TileKey& key);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

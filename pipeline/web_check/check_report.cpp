@@ -7,7 +7,7 @@
 #include "pipeline/common/text_table.h"
 #include "pipeline/web_check/check_url.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 namespace {
 
 // What viewers do, and the remedy, once for all findings of a kind.
@@ -78,4 +78,4 @@ std::string json_of(const CheckReport& report) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <random>
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 namespace {
 
 constexpr std::uint64_t kSeed = 20;
@@ -89,4 +89,4 @@ std::vector<TileKey> sample_tiles(const std::vector<std::vector<TileRange>>& ava
   return keys;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

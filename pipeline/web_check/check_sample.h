@@ -8,7 +8,7 @@
 #include "formats/tile/layer_json.h"
 #include "scheduler/tile_key.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 // The tiles in the middle and at four corners of a zoom's ranges, without repetitions.
 // REQUIRES: sound ranges.
@@ -20,4 +20,4 @@ std::vector<TileKey> telling_tiles(const std::vector<TileRange>& ranges, std::in
 std::vector<TileKey> sample_tiles(const std::vector<std::vector<TileRange>>& available,
                                   const std::vector<TileKey>& roots, std::size_t limit);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

@@ -7,7 +7,7 @@
 
 #include "pipeline/web_check/check_finding.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 inline constexpr std::array<CheckKindText, kCheckKinds> kCheckTexts = {{
     {CheckKind::kNoAnswer, "no-answer", CheckSeverity::kFault, "no viewer can load anything",
@@ -205,4 +205,4 @@ inline constexpr std::array<CheckKindText, kCheckKinds> kCheckTexts = {{
      "Name the address that the redirection leads to."},
 }};
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

@@ -11,7 +11,7 @@
 #include "scheduler/check.h"
 #include "stages/surface/geodesy.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 namespace {
 
 constexpr const char* kMediaType = "application/vnd.quantized-mesh";
@@ -134,4 +134,4 @@ Whereabouts place_of_tile(const TilingScheme& scheme, const TileKey& key,
   return here <= 1 ? Whereabouts::kHere : Whereabouts::kElsewhere;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

@@ -8,7 +8,7 @@
 #include "pipeline/web_check/check_answer.h"
 #include "pipeline/web_check/check_layer.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 // The tile; none where it cannot be had, and then a finding says why. A status other than 200 is
 // the caller's business. Findings of the tile's place are place_of_tile()'s.
@@ -30,4 +30,4 @@ Whereabouts place_of_tile(const TilingScheme& scheme, const TileKey& key,
 // The same column, the row as far from the north as the key's is from the south.
 TileKey mirrored(const TilingScheme& scheme, const TileKey& key);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

@@ -13,7 +13,7 @@
 #include "scheduler/elementary.h"
 #include "stages/surface/geodesy.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 namespace {
 
 constexpr int kMostUnanswered = 3;
@@ -279,4 +279,4 @@ void TileCheck::ask_for_head() {
           (answer ? status_text(*answer) : "there is no answer: " + answer.error().message));
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

@@ -14,7 +14,7 @@
 #include "pipeline/web_check/check_layer.h"
 #include "pipeline/web_check/check_tile_answer.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 // Asks as a browser would for a page.
 struct Asker {
@@ -74,4 +74,4 @@ class TileCheck {
   std::optional<TileKey> first_read_;
 };
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

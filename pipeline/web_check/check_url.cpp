@@ -9,7 +9,7 @@
 #include "pipeline/web_check/web_address.h"
 #include "scheduler/check.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 namespace {
 
 constexpr std::size_t kLargestLayerBytes = std::size_t{64} << 20U;
@@ -125,4 +125,4 @@ CheckReport check_url(const std::string& address, const CheckOptions& options, c
   return UrlCheck(address, options, fetch).run();
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

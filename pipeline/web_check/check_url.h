@@ -16,7 +16,7 @@
 #include "pipeline/web_check/check_finding.h"
 #include "pipeline/web_check/http_answer.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 struct CheckOptions {
   // REQUIRES: >= 1.
@@ -46,4 +46,4 @@ CheckReport check_url(const std::string& address, const CheckOptions& options, c
 std::string text_of(const CheckReport& report);
 std::string json_of(const CheckReport& report);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

@@ -1,6 +1,6 @@
 #include "pipeline/web_check/http_answer.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 std::optional<std::string> HttpAnswer::header(std::string_view name) const {
   for (const HttpHeader& candidate : headers) {
@@ -17,4 +17,4 @@ std::vector<std::string> HttpAnswer::all_headers(std::string_view name) const {
   return values;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

@@ -12,7 +12,7 @@
 
 #include "formats/bytes/result.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 enum class HttpMethod : std::uint8_t { kGet, kHead };
 
@@ -48,4 +48,4 @@ struct HttpAnswer {
 // The error says in words why there is no answer: "cannot connect: connection refused".
 using Fetch = std::function<Result<HttpAnswer>(const HttpQuestion&)>;
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

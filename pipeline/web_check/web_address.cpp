@@ -8,7 +8,7 @@
 #include "pipeline/web_check/http_answer.h"
 #include "scheduler/check.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 namespace {
 
 bool is_printable(std::string_view text) {
@@ -169,4 +169,4 @@ std::string fill_template(std::string_view url_template, const TemplateValues& v
   return text;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

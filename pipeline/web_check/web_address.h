@@ -8,7 +8,7 @@
 #include "formats/bytes/result.h"
 #include "scheduler/tile_key.h"
 
-namespace qmpipe {
+namespace qmpipe::web_check {
 
 struct WebAddress {
   std::string scheme;     // "http" or "https"
@@ -45,4 +45,4 @@ struct TemplateValues {
 // Unknown placeholders stay, with their braces percent-encoded, which is how browsers send them.
 std::string fill_template(std::string_view url_template, const TemplateValues& values);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web_check

@@ -19,8 +19,8 @@
 
 namespace {
 
-using qmpipe::HttpAnswer;
-using qmpipe::HttpQuestion;
+using qmpipe::web_check::HttpAnswer;
+using qmpipe::web_check::HttpQuestion;
 using qmpipe::Result;
 
 constexpr std::array kHeaderNames = {"content-encoding",
@@ -67,7 +67,7 @@ class Server {
     answer.is_cut_off = (flags & kCutOff) != 0;
     answer.redirects = (flags & kRedirected) != 0 ? 1 : 0;
     if ((flags & kNoAnswer) != 0) return qmpipe::Error{"nobody answers at " + question.url};
-    if (question.method == qmpipe::HttpMethod::kHead) answer.body.clear();
+    if (question.method == qmpipe::web_check::HttpMethod::kHead) answer.body.clear();
     if (answer.body.size() > question.limit_bytes) answer.body.resize(question.limit_bytes);
     return answer;
   }
@@ -99,7 +99,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   // Nothing that an answer could hold by chance.
   const std::string password = "pw" + std::to_string(qmpipe::hash64(bytes, 20240229));
   Server server(bytes);
-  const qmpipe::CheckReport report = qmpipe::check_url(
+  const qmpipe::web_check::CheckReport report = qmpipe::web_check::check_url(
       "https://me:" + password + "@tiles.example/set/?key=1", {.most_tiles = kMostTiles},
       [&server](const HttpQuestion& question) { return server.answer(question); });
   demand(report.tiles_sound <= report.tiles_asked);

@@ -39,20 +39,20 @@ constexpr const char* kCheckFooter =
 
 struct CheckArguments {
   std::string address;
-  CheckOptions options;
+  web_check::CheckOptions options;
   double timeout_s = 10;
   bool wants_json = false;
 };
 
 int run_check(const CheckArguments& arguments) {
-  HttpClient client(arguments.timeout_s, stop_flag_of_signals());
-  const CheckReport report =
+  web::HttpClient client(arguments.timeout_s, stop_flag_of_signals());
+  const web_check::CheckReport report =
       check_url(arguments.address, arguments.options,
-                [&client](const HttpQuestion& request) { return client.send(request); });
+                [&client](const web_check::HttpQuestion& request) { return client.send(request); });
   const std::string text = arguments.wants_json ? json_of(report) : text_of(report);
   std::fwrite(text.data(), 1, text.size(), stdout);
   if (!report.is_answered) return kExitUnanswered;
-  return report.count(CheckSeverity::kFault) == 0 ? 0 : kExitFaults;
+  return report.count(web_check::CheckSeverity::kFault) == 0 ? 0 : kExitFaults;
 }
 
 }  // namespace

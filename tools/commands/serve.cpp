@@ -49,7 +49,7 @@ constexpr const char* kServeFooter =
 
 struct ServeArguments {
   std::string path;
-  ListenOptions listen;
+  web::ListenOptions listen;
   bool wants_json = false;
 };
 
@@ -61,8 +61,8 @@ std::string address_of(const ServeArguments& arguments, int port) {
                      port);
 }
 
-std::string greeting(const ServeArguments& arguments, const TileService& service,
-                     const PageFiles& pages, int port) {
+std::string greeting(const ServeArguments& arguments, const web::TileService& service,
+                     const web::PageFiles& pages, int port) {
   const std::string address = address_of(arguments, port);
   if (arguments.wants_json) {
     const nlohmann::ordered_json object = {{"viewer", address},
@@ -85,8 +85,8 @@ std::string greeting(const ServeArguments& arguments, const TileService& service
   return text + "Ctrl-C ends it.\n";
 }
 
-std::string greeting(const ServeArguments& arguments, const DetailService& service,
-                     const PageFiles& pages, int port) {
+std::string greeting(const ServeArguments& arguments, const web::DetailService& service,
+                     const web::PageFiles& pages, int port) {
   const std::string address = address_of(arguments, port);
   if (arguments.wants_json) {
     const nlohmann::ordered_json object = {{"viewer", address},
@@ -109,12 +109,12 @@ std::string greeting(const ServeArguments& arguments, const DetailService& servi
 // `start_page`: the address of the file that "/" is answered with.
 template <class Service>
 int serve(const ServeArguments& arguments, const Service& service, const char* start_page) {
-  const PageFiles pages(find_page_folder());
+  const web::PageFiles pages(web::find_page_folder());
   // From before anybody can know of the server.
   const std::atomic<bool>& stop = *stop_flag_of_signals();
-  HttpServer server(arguments.listen, [&](HttpRequest request) {
+  web::HttpServer server(arguments.listen, [&](web::HttpRequest request) {
     if (request.path == "/") request.path = start_page;
-    std::optional<HttpReply> reply = service.answer(request);
+    std::optional<web::HttpReply> reply = service.answer(request);
     return reply ? reply : pages.answer(request);
   });
   const std::string text = greeting(arguments, service, pages, server.port());
@@ -134,13 +134,13 @@ bool looks_like_a_model(const std::string& path) {
 int run_serve(const ServeArguments& arguments) {
   const std::string name = std::filesystem::absolute(arguments.path).lexically_normal().stem();
   if (looks_like_a_model(arguments.path)) {
-    return serve(arguments, DetailService(load_model(arguments.path), name), "/detail.html");
+    return serve(arguments, web::DetailService(load_model(arguments.path), name), "/detail.html");
   }
   std::unique_ptr<TileSet> tile_set = open_tile_set(arguments.path);
   if (tile_set->keys().empty()) {
     throw IoError("cannot serve", arguments.path, "there is no tile in it", "Check the path.");
   }
-  return serve(arguments, TileService(std::move(tile_set), name), "/index.html");
+  return serve(arguments, web::TileService(std::move(tile_set), name), "/index.html");
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <limits>
 #include <optional>
 
-namespace qmpipe {
+namespace qmpipe::web {
 namespace {
 
 // Digits only; what does not fit is the largest number, which is past the end of any body.
@@ -73,4 +73,4 @@ HttpReply ranged_reply(HttpReply reply, std::string_view range, std::string_view
   return reply;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

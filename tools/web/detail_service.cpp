@@ -13,7 +13,7 @@
 #include "formats/bytes/hash64.h"
 #include "formats/detail_model/arrays.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -146,4 +146,4 @@ HttpReply DetailService::answer_part(const HttpRequest& request, const Part& par
   return reply;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

@@ -21,7 +21,7 @@
 #include "formats/detail_model/data.h"
 #include "tools/web/tile_service.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 
 // const use is safe from several threads.
 class DetailService {
@@ -54,4 +54,4 @@ class DetailService {
   std::string description_etag_;
 };
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

@@ -16,7 +16,7 @@
 #include "pipeline/run/progress.h"
 #include "scheduler/check.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 namespace {
 
 constexpr long kMostRedirects = 5;
@@ -30,7 +30,7 @@ using HeaderList = std::unique_ptr<curl_slist, FreeList>;
 
 // What libcurl hands over while an answer comes in.
 struct Incoming {
-  HttpAnswer answer;
+  web_check::HttpAnswer answer;
   std::size_t limit_bytes = 0;
   std::size_t header_bytes = 0;
   bool is_too_large = false;
@@ -40,7 +40,7 @@ struct Incoming {
   std::exception_ptr failure;
 };
 
-void take_header_line(std::string_view line, HttpAnswer& answer) {
+void take_header_line(std::string_view line, web_check::HttpAnswer& answer) {
   while (!line.empty() && (line.back() == '\n' || line.back() == '\r')) line.remove_suffix(1);
   // The status line of the next answer: after a redirection, or after "100 Continue".
   if (line.starts_with("HTTP/")) {
@@ -91,9 +91,9 @@ int on_progress(void* user, curl_off_t, curl_off_t, curl_off_t, curl_off_t) {
   return incoming.stop != nullptr && incoming.stop->load(std::memory_order_relaxed) ? 1 : 0;
 }
 
-HeaderList list_of(const std::vector<HttpHeader>& headers) {
+HeaderList list_of(const std::vector<web_check::HttpHeader>& headers) {
   HeaderList list;
-  for (const HttpHeader& header : headers) {
+  for (const web_check::HttpHeader& header : headers) {
     curl_slist* longer = curl_slist_append(list.get(), (header.name + ": " + header.value).c_str());
     if (longer == nullptr) throw std::bad_alloc();
     // The list keeps its first element.
@@ -147,7 +147,7 @@ struct HttpClient::Impl {
     QMPIPE_CHECK(curl_easy_setopt(handle.get(), option, value) == CURLE_OK);
   }
 
-  void prepare(const HttpQuestion& request, const HeaderList& headers, Incoming& incoming) {
+  void prepare(const web_check::HttpQuestion& request, const HeaderList& headers, Incoming& incoming) {
     curl_easy_reset(handle.get());  // keeps the connections
     const long timeout_ms = std::max(1L, std::lround(timeout_s * 1000));
     detail.fill('\0');
@@ -157,7 +157,7 @@ struct HttpClient::Impl {
     set(CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
     set(CURLOPT_USERAGENT, (std::string("qmpipe/") + kProgramVersion).c_str());
     set(CURLOPT_HTTPHEADER, headers.get());
-    set(CURLOPT_NOBODY, request.method == HttpMethod::kHead ? 1L : 0L);
+    set(CURLOPT_NOBODY, request.method == web_check::HttpMethod::kHead ? 1L : 0L);
     set(CURLOPT_FOLLOWLOCATION, 1L);
     set(CURLOPT_MAXREDIRS, kMostRedirects);
     set(CURLOPT_TIMEOUT_MS, timeout_ms);
@@ -172,7 +172,7 @@ struct HttpClient::Impl {
     set(CURLOPT_XFERINFODATA, &incoming);
   }
 
-  void describe(HttpAnswer& answer) const {
+  void describe(web_check::HttpAnswer& answer) const {
     long status = 0;
     long redirects = 0;
     const char* url = nullptr;
@@ -197,7 +197,7 @@ HttpClient::~HttpClient() = default;
 HttpClient::HttpClient(HttpClient&&) noexcept = default;
 HttpClient& HttpClient::operator=(HttpClient&&) noexcept = default;
 
-Result<HttpAnswer> HttpClient::send(const HttpQuestion& request) {
+Result<web_check::HttpAnswer> HttpClient::send(const web_check::HttpQuestion& request) {
   Incoming incoming;
   incoming.limit_bytes = request.limit_bytes;
   incoming.stop = impl_->stop;
@@ -223,4 +223,4 @@ Result<HttpAnswer> HttpClient::send(const HttpQuestion& request) {
   return std::move(incoming.answer);
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

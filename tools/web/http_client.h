@@ -16,7 +16,7 @@
 #include "formats/bytes/result.h"
 #include "pipeline/web_check/http_answer.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 
 class HttpClient {
  public:
@@ -27,11 +27,11 @@ class HttpClient {
   HttpClient(HttpClient&&) noexcept;
   HttpClient& operator=(HttpClient&&) noexcept;
 
-  Result<HttpAnswer> send(const HttpQuestion& request);
+  Result<web_check::HttpAnswer> send(const web_check::HttpQuestion& request);
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

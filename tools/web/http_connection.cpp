@@ -12,7 +12,7 @@
 #include "scheduler/check.h"
 #include "tools/web/request_head.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 namespace {
 
 using namespace std::chrono_literals;
@@ -106,4 +106,4 @@ void HttpConnection::linger() {
   }
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace qmpipe {
+namespace qmpipe::web {
 
 // How long a wait goes on before it looks whether the server is to end.
 inline constexpr std::chrono::milliseconds kStopLookedAt{50};
@@ -48,4 +48,4 @@ class HttpConnection {
   std::string unread_;  // a head, once await_head() found one, and what came with it
 };
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

@@ -26,7 +26,7 @@
 #include "tools/web/http_connection.h"
 #include "tools/web/request_head.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 namespace {
 
 using namespace std::chrono_literals;
@@ -282,4 +282,4 @@ void HttpServer::run(const std::atomic<bool>& stop) {
   while (!stop) std::this_thread::sleep_for(kStopLookedAt);
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

@@ -8,7 +8,7 @@
 
 #include "tools/web/tile_service.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 
 struct ListenOptions {
   std::string host = "127.0.0.1";
@@ -43,4 +43,4 @@ class HttpServer {
   int port_ = 0;
 };
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

@@ -10,7 +10,7 @@
 #include "formats/bytes/folders.h"
 #include "formats/bytes/hash64.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 namespace {
 
 namespace fs = std::filesystem;
@@ -120,4 +120,4 @@ fs::path find_page_folder() {
                 "Set QMPIPE_VIEWER to the folder tools/viewer of qmpipe's source.");
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

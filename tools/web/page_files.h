@@ -11,7 +11,7 @@
 
 #include "tools/web/tile_service.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 
 class PageFiles {
  public:
@@ -37,4 +37,4 @@ class PageFiles {
 // belongs to, or its source. Throws IoError when none of them is there.
 std::filesystem::path find_page_folder();
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

@@ -9,7 +9,7 @@
 #include "pipeline/web_check/http_answer.h"
 #include "scheduler/check.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 namespace {
 
 // RFC 9110, section 5.6.2.
@@ -192,4 +192,4 @@ std::variant<RequestHead, HeadFault> parse_request_head(std::string_view head) {
   return parsed;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-namespace qmpipe {
+namespace qmpipe::web {
 
 // What a head may have; none of a browser's comes near them.
 struct HeadLimits {
@@ -41,4 +41,4 @@ std::size_t head_length(std::string_view bytes);
 // REQUIRES: head_length(head) == head.size() > 0. Never throws for what the bytes say.
 std::variant<RequestHead, HeadFault> parse_request_head(std::string_view head);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

@@ -12,7 +12,7 @@
 #include "formats/tile/tile_path.h"
 #include "pipeline/verify/height_glance.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -155,4 +155,4 @@ HttpReply TileService::answer_tile(const HttpRequest& request, const TileKey& ke
   return reply;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

@@ -22,7 +22,7 @@
 #include "formats/tile/tile_set.h"
 #include "formats/tile_sets/fit_layer_json.h"
 
-namespace qmpipe {
+namespace qmpipe::web {
 
 struct HttpRequest {
   std::string path;  // percent-decoded, without the query
@@ -75,4 +75,4 @@ class TileService {
   std::string description_;  // set.json
 };
 
-}  // namespace qmpipe
+}  // namespace qmpipe::web

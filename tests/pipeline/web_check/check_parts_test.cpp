@@ -15,7 +15,7 @@
 #include "pipeline/web_check/web_address.h"
 #include "stages/surface/geodesy.h"
 
-namespace qmpipe::check_parts_test {
+namespace qmpipe::web_check::check_parts_test {
 namespace {
 
 TEST(WebAddress, CredentialsAreNotShown) {
@@ -241,4 +241,4 @@ TEST(Place, OfAHeaderWithoutNumbersIsElsewhere) {
 }
 
 }  // namespace
-}  // namespace qmpipe::check_parts_test
+}  // namespace qmpipe::web_check::check_parts_test

@@ -20,13 +20,13 @@
 #include "pipeline/web_check/web_address.h"
 #include "tests/support/verify_fixture.h"
 
-namespace qmpipe::check_url_test {
+namespace qmpipe::web_check::check_url_test {
 namespace {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-using testing::SetFixture;
+using qmpipe::testing::SetFixture;
 
 constexpr const char* kUrl = "https://tiles.example/set/";
 
@@ -243,4 +243,4 @@ TEST(CheckUrl, EndsWithAReportWhateverTheAnswersHold) {
 }
 
 }  // namespace
-}  // namespace qmpipe::check_url_test
+}  // namespace qmpipe::web_check::check_url_test
