@@ -49,24 +49,26 @@ ComparedMethod build_and_measure(const CompareOptions& options, const ComparedCh
   progress.note(fmt::format("{}: building", name_of(choice)));
   BuildResult built = build_pyramid(build, progress);
   progress.note(fmt::format("{}: measuring", name_of(choice)));
-  const VerifyOptions verify_options = {.sources = build.input.paths,
-                                        .heights = build.input.heights,
-                                        .hausdorff = HausdorffMode::kMeasured,
-                                        .threads = build.run.threads};
+  const verify::VerifyOptions verify_options = {.sources = build.input.paths,
+                                                .heights = build.input.heights,
+                                                .hausdorff = verify::HausdorffMode::kMeasured,
+                                                .threads = build.run.threads};
   return {.choice = choice,
           .recipe = std::move(built.recipe),
           .build = std::move(built.report),
-          .verify = verify(*open_tile_set(build.output.path), verify_options, progress),
+          .verify = verify::verify_set(*open_tile_set(build.output.path), verify_options, progress),
           .trial = std::nullopt};
 }
 
 // The most rugged tile without voids of the deepest zoom that has one; equal ones by key.
-std::optional<TileKey> choose_tile(const VerifyReport& report) {
+std::optional<TileKey> choose_tile(const verify::VerifyReport& report) {
   std::optional<TileKey> chosen;
-  for (const ZoomReport& zoom : report.zooms) {
-    const auto best = std::max_element(
-        zoom.measured.begin(), zoom.measured.end(),
-        [](const MeasuredTile& a, const MeasuredTile& b) { return a.triangles < b.triangles; });
+  for (const verify::ZoomReport& zoom : report.zooms) {
+    const auto best =
+        std::max_element(zoom.measured.begin(), zoom.measured.end(),
+                         [](const verify::MeasuredTile& a, const verify::MeasuredTile& b) {
+                           return a.triangles < b.triangles;
+                         });
     if (best != zoom.measured.end()) chosen = best->key;
   }
   return chosen;
@@ -103,12 +105,13 @@ void try_all(const CompareOptions& options, Comparison& comparison, Progress& pr
     progress.note("no tile is free of voids: there are no distances and no single-tile trials");
     return;
   }
-  const SourceOptions source = {.inputs = options.build.input.paths,
-                                .source_crs = options.build.input.source_crs,
-                                .threads = options.build.run.threads,
-                                .heights = options.build.input.heights};
+  const verify::SourceOptions source = {.inputs = options.build.input.paths,
+                                        .source_crs = options.build.input.source_crs,
+                                        .threads = options.build.run.threads,
+                                        .heights = options.build.input.heights};
   const TilingScheme scheme(options.build.mesh.projection);
-  const auto posts = open_source_posts(source, scheme, comparison.methods.front().recipe, progress);
+  const auto posts =
+      verify::open_source_posts(source, scheme, comparison.methods.front().recipe, progress);
   const std::optional<WindowHeights> window = posts->posts(*comparison.tile);
   QMPIPE_CHECK(window.has_value());
   comparison.tile_heights_m = window->heights_m;

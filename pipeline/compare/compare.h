@@ -49,7 +49,7 @@ struct ComparedMethod {
   ComparedChoice choice;
   Recipe recipe;
   BuildReport build;
-  VerifyReport verify;
+  verify::VerifyReport verify;
   std::optional<TileTrial> trial;
 };
 

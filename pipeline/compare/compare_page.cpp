@@ -182,7 +182,7 @@ std::string run_times_section(const Comparison& comparison, const std::vector<Ro
       comparison.threads, comparison.threads == 1 ? "" : "s");
   for (const Rows& rows : all) {
     const BuildReport& build = rows.method->build;
-    const VerifyReport& verify = rows.method->verify;
+    const verify::VerifyReport& verify = rows.method->verify;
     html += fmt::format(
         "<tr>{}<td>{:.1f}</td><td>{:.1f}</td><td>{}</td><td>{}</td><td>{:.2f}</td>"
         "<td{}>{}</td></tr>",

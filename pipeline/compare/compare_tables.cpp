@@ -62,16 +62,16 @@ std::vector<ComparedZoom> zooms_of(const ComparedMethod& method) {
     zoom.tiles = built.tiles;
     zoom.mean_bytes = mean_of(static_cast<double>(built.stored_bytes), built.tiles);
     zoom.mean_tile_ms = mean_of(1000 * simplify_seconds(built), built.tiles);
-    const auto found =
-        std::find_if(method.verify.zooms.begin(), method.verify.zooms.end(),
-                     [&built](const ZoomReport& report) { return report.zoom == built.zoom; });
+    const auto found = std::find_if(
+        method.verify.zooms.begin(), method.verify.zooms.end(),
+        [&built](const verify::ZoomReport& report) { return report.zoom == built.zoom; });
     if (found == method.verify.zooms.end()) continue;
     zoom.largest_error_m = found->error.largest_m;
     zoom.rms_error_m = found->error.rms_m();
     zoom.full_tiles = std::ssize(found->measured);
     double vertices = 0;
     double triangles = 0;
-    for (const MeasuredTile& tile : found->measured) {
+    for (const verify::MeasuredTile& tile : found->measured) {
       vertices += static_cast<double>(tile.vertices);
       triangles += static_cast<double>(tile.triangles);
       zoom.sorted_hausdorff_m.push_back(tile.hausdorff.to_surfaces_m);

@@ -9,7 +9,7 @@
 #include "stages/finish/quantize.h"
 #include "stages/surface/geodesy.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 struct DecodedBorder {
@@ -165,4 +165,4 @@ BorderComparison compare_borders(const TilingScheme& scheme, const TileKey& key,
   return comparison;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

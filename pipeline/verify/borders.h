@@ -13,7 +13,7 @@
 #include "pipeline/common/finding.h"
 #include "scheduler/tiling_scheme.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 
 // A border vertex as the file has it; `along` is v on the west and east sides, else u.
 struct BorderVertex {
@@ -50,4 +50,4 @@ BorderComparison compare_borders(const TilingScheme& scheme, const TileKey& key,
                                  const TileBorders& tile, Side side, const TileKey& neighbour_key,
                                  const TileBorders& neighbour);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

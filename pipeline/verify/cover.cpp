@@ -8,7 +8,7 @@
 
 #include "stages/surface/delaunay.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 constexpr std::int64_t kTwiceSquare = 2 * static_cast<std::int64_t>(kQuantizedMax) * kQuantizedMax;
@@ -169,4 +169,4 @@ std::vector<Finding> check_cover(const QuantizedMesh& mesh) {
   return findings;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

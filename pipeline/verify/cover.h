@@ -10,7 +10,7 @@
 #include "formats/tile/quantized_mesh.h"
 #include "pipeline/common/finding.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 
 // Clockwise and degenerate triangles, then edges and areas (with clockwise triangles turned round,
 // so that a flipped one is one fault and not four). Edges are compared by place, not by vertex
@@ -18,4 +18,4 @@ namespace qmpipe {
 std::vector<Finding> check_triangles(const QuantizedMesh& mesh);
 std::vector<Finding> check_cover(const QuantizedMesh& mesh);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

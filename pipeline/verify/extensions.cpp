@@ -4,7 +4,7 @@
 
 #include "pipeline/verify/set.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 bool is_listed(const CheckedLayer& layer, const char* extension) {
@@ -113,4 +113,4 @@ std::vector<Finding> check_extensions(const CheckedLayer& layer, const Extension
   return ExtensionCheck(layer, tallies).run();
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -7,7 +7,7 @@
 
 #include "formats/tile/quantized_mesh.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 // Read at the first zoom, and kept of each zoom for being the highest, or the lowest.
@@ -114,4 +114,4 @@ std::optional<HeightSpan> glance_at_heights(const TileSet& tile_set) {
   return range;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -6,7 +6,7 @@
 #include "formats/tile/tile_set.h"
 #include "stages/posts/height_step.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 
 // From the lowest to the highest height of the set's deepest tiles, as their headers say, of some
 // hundred tiles that are read: those of a coarse zoom, and from there to the deepest what lies under the
@@ -14,4 +14,4 @@ namespace qmpipe {
 // stand out; the range may be narrower than the truth, never wider. None where no tile can be read.
 std::optional<HeightSpan> glance_at_heights(const TileSet& tile_set);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -11,7 +11,7 @@
 #include "scheduler/lattice.h"
 #include "stages/finish/tile_error.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 // Rounding of the posts' heights to float32.
@@ -112,4 +112,4 @@ std::vector<Finding> find_levels_apart(const TilingScheme& scheme, const TileOut
                                parent.tolerance_m)}};
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -9,7 +9,7 @@
 #include "pipeline/common/finding.h"
 #include "scheduler/tiling_scheme.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 
 struct TileOutside {
   TileKey key;
@@ -29,4 +29,4 @@ std::vector<Finding> find_cliff(const TilingScheme& scheme, const TileOutside& t
 std::vector<Finding> find_levels_apart(const TilingScheme& scheme, const TileOutside& tile,
                                        const TileOutside& parent);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

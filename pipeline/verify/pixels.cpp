@@ -11,7 +11,7 @@
 #include "formats/sources/source_pool.h"
 #include "scheduler/lattice.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 constexpr double kPixelsInAll = 4096;
@@ -120,4 +120,4 @@ std::vector<Finding> check_pixels(const std::vector<RasterInfo>& sources,
   return findings;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

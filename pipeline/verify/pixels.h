@@ -9,7 +9,7 @@
 #include "pipeline/common/finding.h"
 #include "pipeline/recipe/recipe.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 
 // Of some thousand pixels in all that stand among valid ones, the tiles of the deepest zoom that the
 // set lacks, each once; none of those in `expected`, which are looked for otherwise.
@@ -20,4 +20,4 @@ std::vector<Finding> check_pixels(const std::vector<RasterInfo>& sources,
                                   const std::vector<TileKey>& keys,
                                   const std::vector<TileKey>& expected);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

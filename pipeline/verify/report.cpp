@@ -11,7 +11,7 @@
 #include "pipeline/common/text_table.h"
 #include "pipeline/verify/verify.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -165,4 +165,4 @@ std::string json_of(const VerifyReport& report) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

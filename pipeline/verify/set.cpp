@@ -6,7 +6,7 @@
 #include <span>
 #include <string_view>
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 constexpr std::size_t kExamples = 3;
@@ -365,4 +365,4 @@ std::vector<Finding> check_listing(const CheckedLayer& layer, const std::vector<
   return findings;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -17,7 +17,7 @@
 #include "pipeline/common/finding.h"
 #include "scheduler/tiling_scheme.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 
 struct CheckedLayer {
   std::optional<ParsedLayerJson> parsed;  // none when layer.json cannot be read
@@ -70,4 +70,4 @@ void add_tile(const CheckedLayer& layer, const TileKey& key, const TileExtension
 // What layer.json says of extensions against what the tiles hold.
 std::vector<Finding> check_extensions(const CheckedLayer& layer, const ExtensionTallies& tallies);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -20,7 +20,7 @@
 #include "stages/posts/height_step.h"
 #include "stages/posts/sampling.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 class SurveyedPosts final : public SourcePosts {
@@ -196,4 +196,4 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
   return std::make_unique<SurveyedPosts>(*recipe, std::move(surveyed), std::move(scratch));
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -20,7 +20,7 @@
 #include "stages/finish/tile_error.h"
 #include "stages/posts/heightfield.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 
 class SourcePosts {
  public:
@@ -56,4 +56,4 @@ std::unique_ptr<SourcePosts> open_source_posts(const SourceOptions& options,
                                                const std::optional<Recipe>& recipe,
                                                Progress& progress);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -13,7 +13,7 @@
 #include "stages/finish/quantize.h"
 #include "stages/surface/geodesy.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 // An occlusion point this far out, in radii, stands for one at infinity.
@@ -330,4 +330,4 @@ CheckedTile check_tile(const TilingScheme& scheme, const TileKey& key,
   return checked;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -23,7 +23,7 @@
 #include "pipeline/common/finding.h"
 #include "scheduler/tiling_scheme.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 
 // What a wrong occlusion point is in a tile whose header minimum is below zero: clients compute
 // their own there, so in another program's tile it is a warning.
@@ -42,4 +42,4 @@ CheckedTile check_tile(const TilingScheme& scheme, const TileKey& key,
 std::vector<Finding> check_mesh(const TilingScheme& scheme, const TileKey& key,
                                 const QuantizedMesh& mesh, OcclusionRule rule);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

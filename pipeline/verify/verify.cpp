@@ -23,7 +23,7 @@
 #include "pipeline/verify/tile.h"
 #include "scheduler/check.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 // Tiles that are examined before the next ones are fetched: enough to keep all threads busy.
@@ -368,7 +368,7 @@ HausdorffDistances ZoomReport::mean_hausdorff() const {
           .between_points_m = mean(sum.between_points_m, count)};
 }
 
-VerifyReport verify(const TileSet& tile_set, const VerifyOptions& options, Progress& progress) {
+VerifyReport verify_set(const TileSet& tile_set, const VerifyOptions& options, Progress& progress) {
   QMPIPE_CHECK(options.threads >= 1 && options.most_per_kind >= 0);
   if (options.hausdorff == HausdorffMode::kMeasured && options.sources.empty()) {
     throw UsageError("--hausdorff measures tiles against their source: add --source INPUT");
@@ -376,4 +376,4 @@ VerifyReport verify(const TileSet& tile_set, const VerifyOptions& options, Progr
   return Verification(tile_set, options, progress).run();
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -20,7 +20,7 @@
 #include "pipeline/run/progress.h"
 #include "stages/finish/tile_error.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 
 enum class HausdorffMode { kSkipped, kMeasured };
 
@@ -82,11 +82,11 @@ struct VerifyReport {
 
 // Throws UsageError for options that do not fit together, IoError when a source cannot be read,
 // Interrupted when asked to stop.
-VerifyReport verify(const TileSet& tile_set, const VerifyOptions& options, Progress& progress);
+VerifyReport verify_set(const TileSet& tile_set, const VerifyOptions& options, Progress& progress);
 
 // For people: a table of the zooms, the warnings, the faults, and a line that sums up.
 std::string text_of(const VerifyReport& report);
 // For programs: one JSON object; keys and names of kinds are stable, lengths in metres.
 std::string json_of(const VerifyReport& report);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -8,7 +8,7 @@
 #include "formats/crs/wgs84.h"
 #include "scheduler/elementary.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 namespace {
 
 constexpr double kWideDeg = 60;
@@ -142,4 +142,4 @@ std::optional<HiddenTerrain> hidden_terrain(const QuantizedMeshHeader& header,
   return std::nullopt;
 }
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

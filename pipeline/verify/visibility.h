@@ -14,7 +14,7 @@
 #include "scheduler/tiling_scheme.h"
 #include "stages/surface/geodesy.h"
 
-namespace qmpipe {
+namespace qmpipe::verify {
 
 struct HiddenTerrain {
   GeoPoint camera;
@@ -29,4 +29,4 @@ std::optional<HiddenTerrain> hidden_terrain(const QuantizedMeshHeader& header,
                                             const RectangleDeg& rectangle,
                                             std::span<const Vec3> positions_ecef);
 
-}  // namespace qmpipe
+}  // namespace qmpipe::verify

@@ -19,9 +19,9 @@
 
 namespace {
 
+using qmpipe::Result;
 using qmpipe::web_check::HttpAnswer;
 using qmpipe::web_check::HttpQuestion;
-using qmpipe::Result;
 
 constexpr std::array kHeaderNames = {"content-encoding",
                                      "content-type",

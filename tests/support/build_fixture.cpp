@@ -60,9 +60,10 @@ std::map<std::string, std::vector<std::uint8_t>> BuildTest::contents(const Build
 
 void BuildTest::expect_sound(const BuildOptions& options) {
   Progress progress(ProgressStyle::kSilent, nullptr);
-  VerifyOptions check;
+  verify::VerifyOptions check;
   check.sources = options.input.paths;
-  const VerifyReport report = verify(*open_tile_set(options.output.path), check, progress);
+  const verify::VerifyReport report =
+      verify::verify_set(*open_tile_set(options.output.path), check, progress);
   EXPECT_EQ(report.fault_count, 0) << text_of(report);
   EXPECT_LT(report.largest_crack_m, 1e-3);
   EXPECT_GT(report.tiles, 0);

@@ -194,12 +194,12 @@ void SetFixture::unlist(const TileKey& key) const {
   });
 }
 
-VerifyReport SetFixture::verify(const VerifyOptions& options) const {
+verify::VerifyReport SetFixture::verify(const verify::VerifyOptions& options) const {
   Progress progress(ProgressStyle::kSilent, nullptr);
-  return qmpipe::verify(*open_tile_set(path()), options, progress);
+  return verify::verify_set(*open_tile_set(path()), options, progress);
 }
 
-std::set<std::string> SetFixture::fault_kinds(const VerifyOptions& options) const {
+std::set<std::string> SetFixture::fault_kinds(const verify::VerifyOptions& options) const {
   return kinds_of(verify(options).faults);
 }
 

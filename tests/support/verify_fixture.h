@@ -61,9 +61,9 @@ class SetFixture {
   void unlist(const TileKey& key) const;
   void put(const std::string& name, const std::string& text) const { folder_.put(name, text); }
 
-  VerifyReport verify(const VerifyOptions& options = {}) const;
+  verify::VerifyReport verify(const verify::VerifyOptions& options = {}) const;
   // The names of the kinds of faults that verify finds.
-  std::set<std::string> fault_kinds(const VerifyOptions& options = {}) const;
+  std::set<std::string> fault_kinds(const verify::VerifyOptions& options = {}) const;
   std::set<std::string> warning_kinds() const;
 
  private:

@@ -55,18 +55,18 @@ constexpr const char* kVerifyFooter =
 
 struct VerifyArguments {
   std::string path;
-  VerifyOptions options;
+  verify::VerifyOptions options;
   HeightArguments heights;
   bool wants_hausdorff = false;
   bool wants_json = false;
 };
 
 int run_verify(VerifyArguments arguments) {
-  if (arguments.wants_hausdorff) arguments.options.hausdorff = HausdorffMode::kMeasured;
+  if (arguments.wants_hausdorff) arguments.options.hausdorff = verify::HausdorffMode::kMeasured;
   arguments.options.heights = to_height_options(arguments.heights);
   Progress progress(progress_style(false), stop_flag_of_signals());
   const std::unique_ptr<TileSet> tile_set = open_tile_set(arguments.path);
-  const VerifyReport report = verify(*tile_set, arguments.options, progress);
+  const verify::VerifyReport report = verify::verify_set(*tile_set, arguments.options, progress);
   const std::string text = arguments.wants_json ? json_of(report) : text_of(report);
   std::fwrite(text.data(), 1, text.size(), stdout);
   return report.fault_count == 0 ? 0 : kExitFaults;
@@ -76,7 +76,7 @@ int run_verify(VerifyArguments arguments) {
 
 void register_verify(CLI::App& app, std::function<int()>& action) {
   const auto arguments = std::make_shared<VerifyArguments>();
-  VerifyOptions& options = arguments->options;
+  verify::VerifyOptions& options = arguments->options;
   options.threads = usable_threads();
   CLI::App* command = app.add_subcommand(
       "verify",

@@ -147,7 +147,8 @@ struct HttpClient::Impl {
     QMPIPE_CHECK(curl_easy_setopt(handle.get(), option, value) == CURLE_OK);
   }
 
-  void prepare(const web_check::HttpQuestion& request, const HeaderList& headers, Incoming& incoming) {
+  void prepare(const web_check::HttpQuestion& request, const HeaderList& headers,
+               Incoming& incoming) {
     curl_easy_reset(handle.get());  // keeps the connections
     const long timeout_ms = std::max(1L, std::lround(timeout_s * 1000));
     detail.fill('\0');

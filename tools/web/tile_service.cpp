@@ -104,7 +104,7 @@ std::string TileService::describe() const {
     const RectangleDeg box = bounds_of_deepest(keys, scheme);
     set["bounds_deg"] = {box.west_deg, box.south_deg, box.east_deg, box.north_deg};
   }
-  if (const auto heights = glance_at_heights(*tile_set_)) {
+  if (const auto heights = verify::glance_at_heights(*tile_set_)) {
     set["heights_m"] = {heights->low_m, heights->high_m};
   }
   set["layer_changes"] = layer_.changes;

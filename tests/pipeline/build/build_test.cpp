@@ -123,9 +123,10 @@ TEST_F(BuildTest, ReportAgreesWithVerify) {
   BuildOptions options = options_for({dem}, "tiles");
   const BuildResult built = run(options);
   Progress progress(ProgressStyle::kSilent, nullptr);
-  VerifyOptions check;
+  verify::VerifyOptions check;
   check.sources = {dem};
-  const VerifyReport verified = verify(*open_tile_set(options.output.path), check, progress);
+  const verify::VerifyReport verified =
+      verify::verify_set(*open_tile_set(options.output.path), check, progress);
   ASSERT_EQ(built.report.zooms.size(), verified.zooms.size());
   for (std::size_t k = 0; k < verified.zooms.size(); ++k) {
     EXPECT_EQ(built.report.zooms[k].tiles, verified.zooms[k].tiles);

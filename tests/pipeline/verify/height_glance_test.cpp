@@ -86,7 +86,7 @@ TEST(HeightGlance, FindsTheSummitAndThePitOfASetOfAnySize) {
   SCOPED_TRACE("seed " + std::to_string(seed));
   for (const std::int32_t deepest : {0, 1, 3, 5, 7}) {
     const HillySet set(deepest, seed);
-    const auto found = glance_at_heights(set);
+    const auto found = verify::glance_at_heights(set);
     ASSERT_TRUE(found);
     EXPECT_EQ(*found, set.truth()) << deepest;
     EXPECT_LE(set.read_count(), 128 + 4 * 16 * deepest);
@@ -99,15 +99,15 @@ TEST(HeightGlance, CoarseTilesCountWhereNothingIsFiner) {
   for (const TileKey& key : all) {
     if (key.zoom == 1) set.lose(key);
   }
-  ASSERT_TRUE(glance_at_heights(set));
-  EXPECT_LT(glance_at_heights(set)->high_m, 4000);
+  ASSERT_TRUE(verify::glance_at_heights(set));
+  EXPECT_LT(verify::glance_at_heights(set)->high_m, 4000);
 }
 
 TEST(HeightGlance, ASetWithoutTilesHasNone) {
   HillySet set(0, 1);
   const std::vector<TileKey> all = set.keys();
   for (const TileKey& key : all) set.lose(key);
-  EXPECT_FALSE(glance_at_heights(set));
+  EXPECT_FALSE(verify::glance_at_heights(set));
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ struct TileFixture {
                         grid, heights_m, {}, {.tolerance_m = kToleranceM, .height_steps = steps})),
                     steps);
   }
-  TileOutside outside() const {
+  verify::TileOutside outside() const {
     return {.key = key, .mesh = mesh, .valid = valid, .tolerance_m = kToleranceM};
   }
 };
@@ -53,17 +53,17 @@ TEST(FindCliff, TellsACliffAndNotARampNorWhatTheDataExplain) {
     const double drop_m = 20 + static_cast<double>(random() % 900);
     SCOPED_TRACE(::testing::Message() << "seed " << seed << ": " << drop_m << " m at " << edge);
     const TileFixture cliff(kTile, [&](int i, int) { return i < edge ? drop_m : 0.0; });
-    const auto found = find_cliff(kGeodetic, cliff.outside(), 3);
+    const auto found = verify::find_cliff(kGeodetic, cliff.outside(), 3);
     ASSERT_EQ(found.size(), 1U);
     EXPECT_EQ(found[0].kind, FindingKind::kCliffOutside);
     EXPECT_EQ(found[0].key, kTile);
-    EXPECT_TRUE(find_cliff(kGeodetic, cliff.outside(), drop_m).empty());
+    EXPECT_TRUE(verify::find_cliff(kGeodetic, cliff.outside(), drop_m).empty());
     const TileFixture ramp(kTile,
                            [&](int i, int) { return i < 128 ? 500 : 500 - 3.0 * (i - 127); });
-    EXPECT_TRUE(find_cliff(kGeodetic, ramp.outside(), 3).empty());
+    EXPECT_TRUE(verify::find_cliff(kGeodetic, ramp.outside(), 3).empty());
     // A cliff in the data is the data's.
     const TileFixture inside(kTile, [&](int i, int) { return i < edge / 2 ? drop_m : 0.0; });
-    EXPECT_TRUE(find_cliff(kGeodetic, inside.outside(), 3).empty());
+    EXPECT_TRUE(verify::find_cliff(kGeodetic, inside.outside(), 3).empty());
   }
 }
 
@@ -82,18 +82,18 @@ TEST(FindLevelsApart, ComparesThePostsOutsideTheDataWithTheParents) {
     const auto plane = [slope](double i, double j) { return 800 + slope * i - 0.3 * slope * j; };
     const TileFixture parent(parent_of(key), [&](int i, int j) { return plane(i, j); });
     const TileFixture same(key, [&](int i, int j) { return plane(i0 + i / 2.0, j0 + j / 2.0); });
-    EXPECT_TRUE(find_levels_apart(kGeodetic, same.outside(), parent.outside()).empty());
+    EXPECT_TRUE(verify::find_levels_apart(kGeodetic, same.outside(), parent.outside()).empty());
     const TileFixture apart(key, [&](int i, int j) {
       return plane(i0 + i / 2.0, j0 + j / 2.0) + (i > 200 && j > 100 ? raised_m : 0);
     });
-    const auto found = find_levels_apart(kGeodetic, apart.outside(), parent.outside());
+    const auto found = verify::find_levels_apart(kGeodetic, apart.outside(), parent.outside());
     ASSERT_EQ(found.size(), 1U);
     EXPECT_EQ(found[0].kind, FindingKind::kLevelsApartOutside);
     // Where there are data they may differ: the parent has means.
     const TileFixture in_data(key, [&](int i, int j) {
       return plane(i0 + i / 2.0, j0 + j / 2.0) + (i < 100 ? raised_m : 0);
     });
-    EXPECT_TRUE(find_levels_apart(kGeodetic, in_data.outside(), parent.outside()).empty());
+    EXPECT_TRUE(verify::find_levels_apart(kGeodetic, in_data.outside(), parent.outside()).empty());
   }
 }
 

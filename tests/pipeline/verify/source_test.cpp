@@ -40,8 +40,8 @@ class VerifySource : public ::testing::Test {
     build_pyramid(build, progress);
   }
 
-  VerifyOptions with_source() const {
-    VerifyOptions options;
+  verify::VerifyOptions with_source() const {
+    verify::VerifyOptions options;
     options.sources = {dem_};
     options.threads = 2;
     return options;
@@ -58,9 +58,9 @@ class VerifySource : public ::testing::Test {
 };
 
 TEST_F(VerifySource, FindsEveryPostWithinTheTolerance) {
-  const VerifyReport report = set_.verify(with_source());
+  const verify::VerifyReport report = set_.verify(with_source());
   EXPECT_THAT(report.faults, IsEmpty()) << text_of(report);
-  for (const ZoomReport& zoom : report.zooms) {
+  for (const verify::ZoomReport& zoom : report.zooms) {
     ASSERT_TRUE(zoom.tolerance_m.has_value());
     EXPECT_DOUBLE_EQ(*zoom.tolerance_m, std::ldexp(15000.0, -zoom.zoom));
     EXPECT_GT(zoom.error.posts, 0);
@@ -74,7 +74,7 @@ TEST_F(VerifySource, FindsAPostBeyondTheTolerance) {
     std::uint16_t& h = mesh.h[vertex_inside(mesh)];
     h = static_cast<std::uint16_t>(h < kQuantizedMax / 2 ? h + 16000 : h - 16000);
   });
-  const VerifyReport report = set_.verify(with_source());
+  const verify::VerifyReport report = set_.verify(with_source());
   ASSERT_EQ(report.faults.size(), 1U) << text_of(report);
   EXPECT_EQ(report.faults[0].kind, FindingKind::kTolerance);
   EXPECT_EQ(report.faults[0].key, inner_tile());
@@ -93,9 +93,9 @@ TEST_F(VerifySource, FindsATileThatTheSourceHasDataFor) {
 
 TEST_F(VerifySource, OnlyReportsAnotherProgramsErrors) {
   set_.change_layer([](LayerJson& layer) { layer.qmpipe_json.clear(); });
-  const VerifyReport report = set_.verify(with_source());
+  const verify::VerifyReport report = set_.verify(with_source());
   EXPECT_THAT(report.faults, IsEmpty()) << text_of(report);
-  const ZoomReport& deepest = report.zooms.back();
+  const verify::ZoomReport& deepest = report.zooms.back();
   EXPECT_FALSE(deepest.tolerance_m.has_value());
   EXPECT_EQ(deepest.source_error.posts, 0);
   // The deepest zoom of the build was reduced from a deeper one, so its posts are not the source's.
@@ -105,9 +105,9 @@ TEST_F(VerifySource, OnlyReportsAnotherProgramsErrors) {
 
 // The posts that a tile was made from are means; the source's own are farther off, and all of them count.
 TEST_F(VerifySource, MeasuresTheSourcesOwnPostsBeside) {
-  const VerifyReport report = set_.verify(with_source());
+  const verify::VerifyReport report = set_.verify(with_source());
   std::int64_t posts = 0;
-  for (const ZoomReport& zoom : report.zooms) {
+  for (const verify::ZoomReport& zoom : report.zooms) {
     SCOPED_TRACE(zoom.zoom);
     EXPECT_GT(zoom.source_error.largest_m, 0);
     EXPECT_LT(zoom.source_error.rms_m(), zoom.source_error.largest_m);
@@ -115,7 +115,7 @@ TEST_F(VerifySource, MeasuresTheSourcesOwnPostsBeside) {
     EXPECT_EQ(zoom.source_error.posts, posts);
   }
   // The deepest zoom is the sampling zoom, whose posts on sides belong to two tiles.
-  const ZoomReport& deepest = report.zooms.back();
+  const verify::ZoomReport& deepest = report.zooms.back();
   EXPECT_LT(posts, deepest.error.posts);
   EXPECT_GT(posts, deepest.error.posts * 98 / 100);
   EXPECT_NEAR(deepest.source_error.largest_m, deepest.error.largest_in_place_m, 1e-3);
@@ -134,12 +134,12 @@ TEST_F(VerifySource, ASpikeOfOnePixelShowsInTheSourcesErrorAlone) {
   build.output.path = inputs_.path() / "spiky";
   Progress progress(ProgressStyle::kSilent, nullptr);
   build_pyramid(build, progress);
-  const VerifyReport report =
-      verify(*open_tile_set(build.output.path), {.sources = {spiky}}, progress);
+  const verify::VerifyReport report =
+      verify::verify_set(*open_tile_set(build.output.path), {.sources = {spiky}}, progress);
   EXPECT_THAT(report.faults, IsEmpty()) << text_of(report);
-  const ZoomReport& deepest = report.zooms.back();
+  const verify::ZoomReport& deepest = report.zooms.back();
   EXPECT_LE(deepest.source_error.largest_m, *deepest.tolerance_m + 40);
-  for (const ZoomReport& zoom : report.zooms) {
+  for (const verify::ZoomReport& zoom : report.zooms) {
     if (zoom.zoom > deepest.zoom - 3) continue;
     // Its post there is a mean over 64 or more of which one or two stand out.
     EXPECT_GT(zoom.source_error.largest_m, 3000) << zoom.zoom;
@@ -148,10 +148,10 @@ TEST_F(VerifySource, ASpikeOfOnePixelShowsInTheSourcesErrorAlone) {
 }
 
 TEST_F(VerifySource, MeasuresHausdorffOfTilesWithoutVoids) {
-  VerifyOptions options = with_source();
-  options.hausdorff = HausdorffMode::kMeasured;
-  const VerifyReport report = set_.verify(options);
-  const ZoomReport& deepest = report.zooms.back();
+  verify::VerifyOptions options = with_source();
+  options.hausdorff = verify::HausdorffMode::kMeasured;
+  const verify::VerifyReport report = set_.verify(options);
+  const verify::ZoomReport& deepest = report.zooms.back();
   EXPECT_GT(deepest.measured.size(), 0U);
   EXPECT_LT(std::ssize(deepest.measured), deepest.tiles);
   EXPECT_GT(deepest.mean_hausdorff().to_surfaces_m, 0);
@@ -162,8 +162,8 @@ TEST_F(VerifySource, MeasuresHausdorffOfTilesWithoutVoids) {
 }
 
 TEST_F(VerifySource, SaysTheSameOnAnyNumberOfThreads) {
-  VerifyOptions options = with_source();
-  options.hausdorff = HausdorffMode::kMeasured;
+  verify::VerifyOptions options = with_source();
+  options.hausdorff = verify::HausdorffMode::kMeasured;
   options.threads = 1;
   const std::string expected = json_of(set_.verify(options));
   options.threads = 4;
@@ -175,7 +175,7 @@ TEST_F(VerifySource, SaysTheSameOnAnyNumberOfThreads) {
 }
 
 TEST_F(VerifySource, RefusesASourceThatIsNotThere) {
-  VerifyOptions options = with_source();
+  verify::VerifyOptions options = with_source();
   options.sources = {file_in(inputs_, "gone.tif")};
   EXPECT_THROW(set_.verify(options), IoError);
   set_.change_layer([](LayerJson& layer) { layer.qmpipe_json.clear(); });

@@ -19,7 +19,7 @@ using ::testing::IsEmpty;
 
 TEST(Verify, FindsNothingInASoundSet) {
   const SetFixture set(sixteen_tiles());
-  const VerifyReport report = set.verify();
+  const verify::VerifyReport report = set.verify();
   EXPECT_THAT(report.faults, IsEmpty()) << text_of(report);
   EXPECT_THAT(report.warnings, IsEmpty()) << text_of(report);
   EXPECT_EQ(report.tiles, 16);
@@ -60,7 +60,7 @@ TEST(Verify, RefusesTilesBeyondTheScheme) {
 TEST(Verify, TellsTheWholeCrackAndWhereItIs) {
   const SetFixture set(sixteen_tiles());
   set.change(kWestTile, [](QuantizedMesh& mesh) { mesh.h[vertex_on_side(mesh, Side::kEast)] = 0; });
-  const VerifyReport report = set.verify();
+  const verify::VerifyReport report = set.verify();
   ASSERT_EQ(report.faults.size(), 1U);
   EXPECT_EQ(report.faults[0].key, kWestTile);
   EXPECT_THAT(report.faults[0].text, HasSubstr("east side against 2/1/2"));
@@ -116,7 +116,7 @@ TEST(Verify, CountsAGlobeOfListedTilesWithoutWalkingIt) {
     // They overlap, and leave out the northernmost row.
     layer.available[kMaxZoom] = {{0, 0, kColumns - 1, kRows / 2}, {0, 5, kColumns - 1, kRows - 2}};
   });
-  const VerifyReport report = set.verify();
+  const verify::VerifyReport report = set.verify();
   ASSERT_EQ(report.faults.size(), 1U);
   const std::int64_t listed = std::int64_t{kColumns} * (kRows - 1);
   const std::string zoom = std::to_string(kMaxZoom);
@@ -132,7 +132,7 @@ TEST(Verify, CountsAllFaultsAndShowsTheFirst) {
       std::swap(mesh.indices[3], mesh.indices[4]);
     });
   }
-  const VerifyReport report = set.verify({.most_per_kind = 2});
+  const verify::VerifyReport report = set.verify({.most_per_kind = 2});
   EXPECT_EQ(report.fault_count, 4);
   ASSERT_EQ(report.faults.size(), 2U);
   EXPECT_THAT(report.faults[0].text, HasSubstr("2 of "));
@@ -164,7 +164,7 @@ TEST(Verify, EndsWithFindingsWhateverTheBytes) {
     for (int k = 0; k < 4; ++k) {
       bytes[random() % reach] = static_cast<std::uint8_t>(random());
     }
-    ASSERT_NO_THROW(check_tile(scheme, kLeaf, bytes, OcclusionRule::kAlwaysRight))
+    ASSERT_NO_THROW(verify::check_tile(scheme, kLeaf, bytes, verify::OcclusionRule::kAlwaysRight))
         << "seed " << kSeed << ", round " << round;
     if (round % 100 != 0) continue;
     set.put_bytes(kLeaf, bytes);
@@ -174,7 +174,7 @@ TEST(Verify, EndsWithFindingsWhateverTheBytes) {
 
 TEST(Verify, WantsASourceForHausdorff) {
   const SetFixture set(sixteen_tiles());
-  EXPECT_THROW(set.verify({.hausdorff = HausdorffMode::kMeasured}), UsageError);
+  EXPECT_THROW(set.verify({.hausdorff = verify::HausdorffMode::kMeasured}), UsageError);
 }
 
 }  // namespace

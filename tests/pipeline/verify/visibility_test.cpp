@@ -48,7 +48,7 @@ TEST(HiddenTerrain, OurPointsHideNoTileThatIsSeen) {
     const double height_m = seed % 3 == 0 ? 0 : uniform(random, -500, 8800);
     const std::vector<Vec3> points = grid_of(rectangle, height_m);
     const QuantizedMeshHeader header = header_of(rectangle, points, height_m, height_m + 10);
-    const auto hidden = hidden_terrain(header, rectangle, points);
+    const auto hidden = verify::hidden_terrain(header, rectangle, points);
     EXPECT_FALSE(hidden) << to_string(key) << " at " << height_m << " m from longitude "
                          << hidden->camera.longitude_deg << ", latitude "
                          << hidden->camera.latitude_deg << ", height " << hidden->camera.height_m;
@@ -64,16 +64,16 @@ TEST(HiddenTerrain, APointTowardsElsewhereHidesATileFromOneWhoStandsOnIt) {
     const RectangleDeg rectangle = scheme.rectangle_deg(key);
     const std::vector<Vec3> points = grid_of(rectangle, 100);
     QuantizedMeshHeader header = header_of(rectangle, points, 100, 110);
-    EXPECT_FALSE(hidden_terrain(header, rectangle, points));
+    EXPECT_FALSE(verify::hidden_terrain(header, rectangle, points));
     // As far away as the client's arithmetic bears, but along the centre of a sphere that stands at
     // the earth's: anywhere.
     const Vec3 anywhere =
         unit({uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1)});
     header.horizon_occlusion_point = scaled(anywhere, 1e6);
-    EXPECT_TRUE(hidden_terrain(header, rectangle, points));
+    EXPECT_TRUE(verify::hidden_terrain(header, rectangle, points));
     // Below zero the client looks for a point itself, finds none, and takes the header's after all.
     header.min_height_m = -1;
-    EXPECT_TRUE(hidden_terrain(header, rectangle, points));
+    EXPECT_TRUE(verify::hidden_terrain(header, rectangle, points));
   }
 }
 
@@ -82,7 +82,7 @@ TEST(HiddenTerrain, PeaksOnTheRimOfAHemisphereAreSeenFromTheEarthsShadow) {
   const std::vector<Vec3> points = grid_of(rectangle, 8000);
   QuantizedMeshHeader header = header_of(rectangle, points, 8000, 8000);
   header.horizon_occlusion_point = {0, 1e6, 0};
-  const auto hidden = hidden_terrain(header, rectangle, points);
+  const auto hidden = verify::hidden_terrain(header, rectangle, points);
   ASSERT_TRUE(hidden);
   // The camera is on the other side of the rim.
   EXPECT_LT(to_ecef(hidden->camera)[1], 0);
@@ -92,9 +92,9 @@ TEST(HiddenTerrain, ASmallTileWhosePointLiesTooLowIsHiddenFromAbove) {
   const RectangleDeg rectangle = TilingScheme(Projection::kGeodetic).rectangle_deg({8, 300, 190});
   const std::vector<Vec3> points = grid_of(rectangle, 3000);
   QuantizedMeshHeader header = header_of(rectangle, points, 3000, 3000);
-  EXPECT_FALSE(hidden_terrain(header, rectangle, points));
+  EXPECT_FALSE(verify::hidden_terrain(header, rectangle, points));
   header.horizon_occlusion_point = scaled(header.horizon_occlusion_point, -1);
-  EXPECT_TRUE(hidden_terrain(header, rectangle, points));
+  EXPECT_TRUE(verify::hidden_terrain(header, rectangle, points));
 }
 
 }  // namespace

@@ -23,10 +23,10 @@
 namespace qmpipe::web_check::check_url_test {
 namespace {
 
+using qmpipe::testing::SetFixture;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-using qmpipe::testing::SetFixture;
 
 constexpr const char* kUrl = "https://tiles.example/set/";
 
