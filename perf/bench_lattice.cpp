@@ -28,8 +28,7 @@ std::unique_ptr<const LatticeInputs> make_inputs(DemKind kind) {
   const auto sampler = open_sampler(inputs->dem->path(), Resampling::kBilinear);
   for (const TileKey& tile : inputs->dem->tiles()) {
     inputs->blocks.emplace_back(kBlockSize);
-    sampler->sample(Lattice(kScheme, kDemZoom), testing::window_of_block(tile),
-                    inputs->blocks.back());
+    sampler->sample(Lattice(kScheme, kDemZoom), posts_of(tile), inputs->blocks.back());
   }
   return inputs;
 }

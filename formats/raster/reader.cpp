@@ -67,26 +67,27 @@ void describe_blocks(GDALRasterBand& band, bool has_mask, RasterInfo& info) {
   int width = 0;
   int height = 0;
   band.GetBlockSize(&width, &height);
-  info.block_width = width;
-  info.block_height = height;
+  info.blocks.width = width;
+  info.blocks.height = height;
   std::int64_t across = 1;
   std::int64_t down = 1;
   if (info.driver == "VRT") {
-    across = joined(kVirtualSide, info.block_width, info.width);
-    down = joined(kVirtualSide, info.block_height, info.height);
-  } else if (info.block_width * info.block_height < kFewPixels) {
-    across = joined(kJoinedSide, info.block_width, info.width);
-    down = joined(kJoinedSide, info.block_height, info.height);
-    if (info.block_width >= info.width) {
-      down = joined(kJoinedSide * kJoinedSide / info.block_width, info.block_height, info.height);
+    across = joined(kVirtualSide, info.blocks.width, info.width);
+    down = joined(kVirtualSide, info.blocks.height, info.height);
+  } else if (info.blocks.width * info.blocks.height < kFewPixels) {
+    across = joined(kJoinedSide, info.blocks.width, info.width);
+    down = joined(kJoinedSide, info.blocks.height, info.height);
+    if (info.blocks.width >= info.width) {
+      down = joined(kJoinedSide * kJoinedSide / info.blocks.width, info.blocks.height, info.height);
     }
   }
-  info.cached_width = across * info.block_width;
-  info.cached_height = down * info.block_height;
+  info.blocks.cached_width = across * info.blocks.width;
+  info.blocks.cached_height = down * info.blocks.height;
   const std::int64_t value_bytes = GDALGetDataTypeSizeBytes(band.GetRasterDataType());
-  info.cached_block_bytes =
-      info.cached_width * info.cached_height * (value_bytes + (has_mask ? 1 : 0));
-  info.handle_bytes = handle_bytes_of(band, info.block_width * info.block_height * value_bytes);
+  info.blocks.cached_bytes =
+      info.blocks.cached_width * info.blocks.cached_height * (value_bytes + (has_mask ? 1 : 0));
+  info.blocks.handle_bytes =
+      handle_bytes_of(band, info.blocks.width * info.blocks.height * value_bytes);
 }
 
 RasterReader::RasterReader(GDALRasterBand& band, bool has_mask, const RasterInfo& info,
@@ -98,17 +99,18 @@ RasterReader::RasterReader(GDALRasterBand& band, bool has_mask, const RasterInfo
       cache_(std::move(cache)),
       source_number_(source_number),
       watcher_(watcher) {
-  QMPIPE_CHECK(info.cached_block_bytes > 0);
+  QMPIPE_CHECK(info.blocks.cached_bytes > 0);
   kind_.type = band.GetRasterDataType();
   kind_.value_bytes = GDALGetDataTypeSizeBytes(band.GetRasterDataType());
   // Only where GDAL's blocks lie one below the other do they fill one of ours in one piece.
-  kind_.goes_round_gdal_cache = info.driver != "VRT" && (info.cached_width == info.block_width);
+  kind_.goes_round_gdal_cache =
+      info.driver != "VRT" && (info.blocks.cached_width == info.blocks.width);
   if (mask_ == nullptr) return;
   int width = 0;
   int height = 0;
   mask_->GetBlockSize(&width, &height);
   kind_.mask_is_shaped_alike = mask_->GetRasterDataType() == GDT_Byte &&
-                               width == info.block_width && height == info.block_height;
+                               width == info.blocks.width && height == info.blocks.height;
 }
 
 void RasterReader::raster_io(GDALRasterBand& band, const PixelWindow& window, int type, void* into,
@@ -130,9 +132,10 @@ void RasterReader::read_past_cache(const PixelWindow& window, std::span<double> 
 
 // The part of the raster that a block of the cache holds: less than the whole block at the edges.
 PixelWindow RasterReader::covered_by(std::int64_t column, std::int64_t row) const {
-  PixelWindow covered{.column0 = column * info_.cached_width, .row0 = row * info_.cached_height};
-  covered.width = std::min(info_.cached_width, info_.width - covered.column0);
-  covered.height = std::min(info_.cached_height, info_.height - covered.row0);
+  PixelWindow covered{.column0 = column * info_.blocks.cached_width,
+                      .row0 = row * info_.blocks.cached_height};
+  covered.width = std::min(info_.blocks.cached_width, info_.width - covered.column0);
+  covered.height = std::min(info_.blocks.cached_height, info_.height - covered.row0);
   return covered;
 }
 
@@ -140,22 +143,23 @@ PixelWindow RasterReader::covered_by(std::int64_t column, std::int64_t row) cons
 void RasterReader::decode_file_blocks(GDALRasterBand& band, const PixelWindow& covered,
                                       std::span<std::uint8_t> bytes) const {
   const GdalSession session;
-  const auto block_bytes = static_cast<std::size_t>(
-      info_.block_width * info_.block_height * GDALGetDataTypeSizeBytes(band.GetRasterDataType()));
-  const std::int64_t first = covered.row0 / info_.block_height;
-  const std::int64_t count = blocks_for(covered.height, info_.block_height);
+  const auto block_bytes =
+      static_cast<std::size_t>(info_.blocks.width * info_.blocks.height *
+                               GDALGetDataTypeSizeBytes(band.GetRasterDataType()));
+  const std::int64_t first = covered.row0 / info_.blocks.height;
+  const std::int64_t count = blocks_for(covered.height, info_.blocks.height);
   for (std::int64_t k = 0; k < count; ++k) {
     std::uint8_t* const into =
         bytes.subspan(static_cast<std::size_t>(k) * block_bytes, block_bytes).data();
-    const CPLErr result = band.ReadBlock(static_cast<int>(covered.column0 / info_.block_width),
+    const CPLErr result = band.ReadBlock(static_cast<int>(covered.column0 / info_.blocks.width),
                                          static_cast<int>(first + k), into);
     if (result == CE_None) continue;
-    const std::int64_t row0 = (first + k) * info_.block_height;
+    const std::int64_t row0 = (first + k) * info_.blocks.height;
     refuse(info_,
            {.column0 = covered.column0,
             .row0 = row0,
             .width = covered.width,
-            .height = std::min(info_.block_height, info_.height - row0)},
+            .height = std::min(info_.blocks.height, info_.height - row0)},
            session);
   }
 }
@@ -164,20 +168,22 @@ void RasterReader::decode_file_blocks(GDALRasterBand& band, const PixelWindow& c
 void RasterReader::decode(std::int64_t column, std::int64_t row,
                           std::span<std::uint8_t> bytes) const {
   const PixelWindow covered = covered_by(column, row);
-  const auto pixels = static_cast<std::size_t>(info_.cached_width * info_.cached_height);
+  const auto pixels =
+      static_cast<std::size_t>(info_.blocks.cached_width * info_.blocks.cached_height);
   const std::span<std::uint8_t> values =
       bytes.first(pixels * static_cast<std::size_t>(kind_.value_bytes));
   if (kind_.goes_round_gdal_cache) {
     decode_file_blocks(band_, covered, values);
   } else {
-    raster_io(band_, covered, kind_.type, values.data(), info_.cached_width * kind_.value_bytes);
+    raster_io(band_, covered, kind_.type, values.data(),
+              info_.blocks.cached_width * kind_.value_bytes);
   }
   if (mask_ == nullptr) return;
   const std::span<std::uint8_t> mask = bytes.subspan(values.size(), pixels);
   if (kind_.goes_round_gdal_cache && kind_.mask_is_shaped_alike) {
     decode_file_blocks(*mask_, covered, mask);
   } else {
-    raster_io(*mask_, covered, GDT_Byte, mask.data(), info_.cached_width);
+    raster_io(*mask_, covered, GDT_Byte, mask.data(), info_.blocks.cached_width);
   }
 }
 
@@ -190,13 +196,13 @@ void RasterReader::copy_values(const std::uint8_t* from, double* to, std::int64_
 void RasterReader::show(std::int64_t block, const PixelWindow& covered,
                         std::span<const std::uint8_t> bytes) const {
   const std::uint8_t* const mask =
-      mask_ == nullptr
-          ? nullptr
-          : bytes.data() + info_.cached_width * info_.cached_height * kind_.value_bytes;
+      mask_ == nullptr ? nullptr
+                       : bytes.data() + info_.blocks.cached_width * info_.blocks.cached_height *
+                                            kind_.value_bytes;
   std::vector<double> values;
   for (std::int64_t r = 0; r < covered.height; ++r) {
     for (std::int64_t c = 0; c < covered.width; c += kFewPixels) {
-      const std::int64_t first = r * info_.cached_width + c;
+      const std::int64_t first = r * info_.blocks.cached_width + c;
       values.resize(static_cast<std::size_t>(std::min(kFewPixels, covered.width - c)));
       const auto count = static_cast<std::int64_t>(values.size());
       copy_values(bytes.data() + first * kind_.value_bytes, values.data(), count);
@@ -214,10 +220,10 @@ void RasterReader::read_block(std::int64_t column, std::int64_t row, const Pixel
   const PixelWindow covered = covered_by(column, row);
   const SourceBlockCache::Request request{
       .source = source_number_,
-      .index = row * blocks_for(info_.width, info_.cached_width) + column,
-      .size_bytes = info_.cached_block_bytes,
-      .file_blocks = blocks_for(covered.width, info_.block_width) *
-                     blocks_for(covered.height, info_.block_height)};
+      .index = row * blocks_for(info_.width, info_.blocks.cached_width) + column,
+      .size_bytes = info_.blocks.cached_bytes,
+      .file_blocks = blocks_for(covered.width, info_.blocks.width) *
+                     blocks_for(covered.height, info_.blocks.height)};
   const auto bytes = cache_->get(request, [&](std::span<std::uint8_t> into) {
     decode(column, row, into);
     if (watcher_ != nullptr && watcher_->wants(request.index)) show(request.index, covered, into);
@@ -226,9 +232,11 @@ void RasterReader::read_block(std::int64_t column, std::int64_t row, const Pixel
   const std::int64_t width =
       std::min(window.column0 + window.width, covered.column0 + covered.width) - first;
   const std::int64_t end = std::min(window.row0 + window.height, covered.row0 + covered.height);
-  const std::int64_t mask_start = info_.cached_width * info_.cached_height * kind_.value_bytes;
+  const std::int64_t mask_start =
+      info_.blocks.cached_width * info_.blocks.cached_height * kind_.value_bytes;
   for (std::int64_t r = std::max(window.row0, covered.row0); r < end; ++r) {
-    const std::int64_t from = (r - covered.row0) * info_.cached_width + first - covered.column0;
+    const std::int64_t from =
+        (r - covered.row0) * info_.blocks.cached_width + first - covered.column0;
     const std::int64_t to = (r - window.row0) * window.width + first - window.column0;
     copy_values(bytes->data() + from * kind_.value_bytes, values.data() + to, width);
     if (!mask.empty()) {
@@ -245,10 +253,10 @@ void RasterReader::read(const PixelWindow& window, std::span<double> values,
     read_past_cache(window, values, mask);
     return;
   }
-  const std::int64_t last_row = (window.row0 + window.height - 1) / info_.cached_height;
-  const std::int64_t last_column = (window.column0 + window.width - 1) / info_.cached_width;
-  for (std::int64_t row = window.row0 / info_.cached_height; row <= last_row; ++row) {
-    for (std::int64_t column = window.column0 / info_.cached_width; column <= last_column;
+  const std::int64_t last_row = (window.row0 + window.height - 1) / info_.blocks.cached_height;
+  const std::int64_t last_column = (window.column0 + window.width - 1) / info_.blocks.cached_width;
+  for (std::int64_t row = window.row0 / info_.blocks.cached_height; row <= last_row; ++row) {
+    for (std::int64_t column = window.column0 / info_.blocks.cached_width; column <= last_column;
          ++column) {
       read_block(column, row, window, values, mask);
     }

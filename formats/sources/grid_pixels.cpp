@@ -39,13 +39,13 @@ GridPixels::GridPixels(const SourcePool& pool) {
     if (number == pieces_.size()) pieces_.emplace_back();
     // Where the grid goes round the globe, what is beyond its last column is at its first.
     std::int64_t column = 0;
-    std::int64_t on_grid = raster.whole_column;
+    std::int64_t on_grid = raster.part.column;
     while (column < raster.width) {
       const std::int64_t width = std::min(raster.width - column, grid.width - on_grid);
-      QMPIPE_CHECK(width > 0 && raster.whole_row + raster.height <= grid.height);
+      QMPIPE_CHECK(width > 0 && raster.part.row + raster.height <= grid.height);
       pieces_[number].push_back({.raster = k,
                                  .on_grid = {.column0 = on_grid,
-                                             .row0 = raster.whole_row,
+                                             .row0 = raster.part.row,
                                              .width = width,
                                              .height = raster.height},
                                  .column = column});

@@ -274,9 +274,9 @@ void join(std::span<RasterInfo> rasters, const Cluster& cluster,
   const auto whole = std::make_shared<const GridInfo>(grid->info());
   for (const Member& member : members) {
     RasterInfo& raster = rasters[member.raster];
-    raster.whole = whole;
-    raster.whole_column = turned(member.turned_column - columns.first, cluster.turn);
-    raster.whole_row = member.row - first_row;
+    raster.part.whole = whole;
+    raster.part.column = turned(member.turned_column - columns.first, cluster.turn);
+    raster.part.row = member.row - first_row;
     raster.pixel_deg = whole->pixel_deg;
   }
 }

@@ -61,15 +61,15 @@ void RasterSource::Impl::describe(const std::string& path) {
   info.assumptions = opened.assumptions;
   info.assumptions.insert(info.assumptions.end(), height_band.assumptions.begin(),
                           height_band.assumptions.end());
-  info.type_name = GDALGetDataTypeName(band->GetRasterDataType());
+  info.band.type_name = GDALGetDataTypeName(band->GetRasterDataType());
 }
 
 void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
-  info.crs_name = crs.name;
-  info.crs_wkt = crs.text.wkt;
-  info.is_geographic = crs.is_geographic;
-  info.height_reference = crs.vertical.reference;
-  info.vertical_name = crs.vertical.name;
+  info.crs.name = crs.name;
+  info.crs.wkt = crs.text.wkt;
+  info.crs.is_geographic = crs.is_geographic;
+  info.band.reference = crs.vertical.reference;
+  info.band.vertical_name = crs.vertical.name;
   info.assumptions.insert(info.assumptions.end(), crs.assumptions.begin(), crs.assumptions.end());
   const CrsNeed need = crs.text.wkt.empty() ? CrsNeed::kOptional : CrsNeed::kRequired;
   const std::optional<PixelPlane> given = plane_of(*opened.dataset, info.path, need);
@@ -84,8 +84,8 @@ void RasterSource::Impl::place_in_plane(const RasterCrs& crs) {
 void RasterSource::Impl::take_heights(const RasterCrs& crs) {
   RuledHeights heights = height_rule_of(*band, info.driver, crs, height_options);
   rule = std::move(heights.rule);
-  info.unit = std::move(heights.unit);
-  info.metres_per_unit = rule.metres_per_unit;
+  info.band.unit = std::move(heights.unit);
+  info.band.metres_per_unit = rule.metres_per_unit;
   info.assumptions.insert(info.assumptions.end(), heights.assumptions.begin(),
                           heights.assumptions.end());
 }
@@ -98,7 +98,7 @@ void RasterSource::Impl::place_on_globe(const RasterCrs& crs) {
                   "name the right one with --source-crs EPSG:n");
   }
   static_cast<GridInfo&>(info) = grid->info();
-  info.transformation = info.placement->transformation;
+  info.crs.transformation = info.placement->transformation;
   if (info.placement->is_ballpark) {
     info.assumptions.push_back("no transformation is known from the datum of the CRS '" + crs.name +
                                "' to WGS84; they are taken as the same");
@@ -106,7 +106,7 @@ void RasterSource::Impl::place_on_globe(const RasterCrs& crs) {
   const RectangleDeg& b = info.bounds_deg;
   if (!(info.pixel_deg > 0) || !(b.west_deg < b.east_deg) || !(b.south_deg < b.north_deg)) {
     throw IoError("cannot place the raster", info.path,
-                  "its corners do not lie on the globe in the CRS '" + info.crs_name + "'",
+                  "its corners do not lie on the globe in the CRS '" + info.crs.name + "'",
                   "check the bounds with gdalinfo; name the right CRS with --source-crs EPSG:n");
   }
 }
@@ -127,7 +127,7 @@ void RasterSource::Impl::note_unplaced() {
       "about {:.0f} % of its pixels have heights that lie nowhere on the globe (one is in "
       "column {}, row {}): the CRS '{}' does not reach there; they are left out",
       std::ceil(100 * static_cast<double>(heights) / static_cast<double>(unplaced.looked_at)),
-      first.column, first.row, info.crs_name));
+      first.column, first.row, info.crs.name));
 }
 
 void RasterSource::Impl::read(const PixelWindow& window, std::span<double> out, bool is_watched) {

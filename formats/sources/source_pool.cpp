@@ -21,8 +21,9 @@ constexpr std::int64_t kManySources = 64;
 
 // The CRS is taken over from the first opening, and what that was is not looked at again.
 bool is_the_same(const RasterInfo& a, const RasterInfo& b) {
-  return a.width == b.width && a.height == b.height && a.block_width == b.block_width &&
-         a.block_height == b.block_height && a.type_name == b.type_name && a.plane == b.plane;
+  return a.width == b.width && a.height == b.height && a.blocks.width == b.blocks.width &&
+         a.blocks.height == b.blocks.height && a.band.type_name == b.band.type_name &&
+         a.plane == b.plane;
 }
 
 // What is asked for, or the place that it may take: one of those that are free, else that of what was
@@ -76,7 +77,7 @@ const RasterSource& SourcePool::source(std::size_t number) {
 
 const GridInfo& SourcePool::grid_info(std::size_t number) const {
   const RasterInfo& raster = info(number);
-  return raster.whole ? *raster.whole : raster;
+  return raster.part.whole ? *raster.part.whole : raster;
 }
 
 const RasterGrid& SourcePool::grid(std::size_t number) {

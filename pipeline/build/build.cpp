@@ -67,8 +67,8 @@ void note_grids(const std::vector<RasterInfo>& sources, Progress& progress) {
   std::set<const GridInfo*> grids;
   std::size_t joined = 0;
   for (const RasterInfo& source : sources) {
-    if (!source.whole) continue;
-    grids.insert(source.whole.get());
+    if (!source.part.whole) continue;
+    grids.insert(source.part.whole.get());
     ++joined;
   }
   if (joined == 0) return;

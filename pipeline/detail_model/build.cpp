@@ -45,7 +45,7 @@ bool are_whole_metres(const Dem& dem) {
 
 // x and y of the south-western post: those of the CRS in metres, and of degrees none.
 std::array<double, 2> origin_of(const Dem& dem) {
-  if (dem.info.is_geographic) return {0, 0};
+  if (dem.info.crs.is_geographic) return {0, 0};
   const PixelPoint pixel = dem.pixel_of(0, 0);
   const PixelPlane& plane = dem.info.plane;
   return {(plane.x0 + plane.x_per_column * pixel.column) * plane.unit,
@@ -100,7 +100,7 @@ Input read_dem_input(const DetailBuildOptions& options, Progress& progress,
   note_findings(*tally, options.heights, progress);
   Input input;
   input.frame = frame_of(dem, options.height_step_m);
-  input.crs_wkt = dem.info.crs_wkt;
+  input.crs_wkt = dem.info.crs.wkt;
   const std::vector<std::int32_t> z = rounded_heights(dem, input.frame.step_m[2]);
   report.read_s = watch.lap();
   input.base = grid_base(

@@ -15,15 +15,15 @@ void note_sources(const std::vector<RasterInfo>& sources, Progress& progress) {
   }
   std::set<std::string> datums;
   for (const RasterInfo& source : sources) {
-    if (source.height_reference != HeightReference::kDatum) continue;
-    if (!datums.insert(source.vertical_name).second) continue;
+    if (source.band.reference != HeightReference::kDatum) continue;
+    if (!datums.insert(source.band.vertical_name).second) continue;
     progress.note(source.path + ": heights are written as they are, above '" +
-                  source.vertical_name +
+                  source.band.vertical_name +
                   "': nothing is converted to heights above the WGS84 ellipsoid, which tiles are "
                   "made of (they will stand off by the geoid's height, up to 100 m)");
   }
   if (std::any_of(sources.begin(), sources.end(), [](const RasterInfo& source) {
-        return source.height_reference == HeightReference::kUnknown;
+        return source.band.reference == HeightReference::kUnknown;
       })) {
     progress.note(
         "heights are written as they are: the input names no vertical datum, so they are taken as "

@@ -25,8 +25,8 @@ MemoryNeeds needs_of(const SurveyChoice& survey, const std::vector<RasterInfo>& 
   // Every thread has its own handles, on as many sources at a time as it may have open.
   std::vector<std::int64_t> handles;
   for (const RasterInfo& source : sources) {
-    needs.source_block_bytes = std::max(needs.source_block_bytes, source.cached_block_bytes);
-    handles.push_back(source.handle_bytes);
+    needs.source_block_bytes = std::max(needs.source_block_bytes, source.blocks.cached_bytes);
+    handles.push_back(source.blocks.handle_bytes);
   }
   std::sort(handles.begin(), handles.end(), std::greater<>());
   handles.resize(std::min(handles.size(), survey.open_sources));

@@ -35,8 +35,8 @@ Footprint footprint_of(const Lattice& lattice, const RasterInfo& source) {
   const auto block = [](double post) {
     return static_cast<std::int32_t>(std::floor(post / kBlockPosts));
   };
-  const std::int64_t width = std::max<std::int64_t>(1, source.cached_width);
-  const std::int64_t height = std::max<std::int64_t>(1, source.cached_height);
+  const std::int64_t width = std::max<std::int64_t>(1, source.blocks.cached_width);
+  const std::int64_t height = std::max<std::int64_t>(1, source.blocks.cached_height);
   const RectangleDeg& box = source.bounds_deg;
   return {.first_x = block(lattice.column_at(box.west_deg)),
           .last_x = block(lattice.column_at(box.east_deg)),
@@ -47,7 +47,7 @@ Footprint footprint_of(const Lattice& lattice, const RasterInfo& source) {
           .rows = (source.height + height - 1) / height,
           .column_pixels = static_cast<double>(width),
           .row_pixels = static_cast<double>(height),
-          .cached_block_bytes = source.cached_block_bytes};
+          .cached_block_bytes = source.blocks.cached_bytes};
 }
 
 std::int32_t columns_of_blocks(const Lattice& lattice) {

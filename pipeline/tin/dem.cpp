@@ -55,9 +55,9 @@ void read_heights(const RasterSource& source, Dem& dem) {
   const RasterInfo& info = dem.info;
   // Whole rows of blocks, so that none is decoded twice; where one is higher than that, GDAL's cache
   // keeps it.
-  const std::int64_t rows_at_once = info.block_height >= kRowsAtOnce
-                                        ? info.block_height
-                                        : kRowsAtOnce / info.block_height * info.block_height;
+  const std::int64_t rows_at_once = info.blocks.height >= kRowsAtOnce
+                                        ? info.blocks.height
+                                        : kRowsAtOnce / info.blocks.height * info.blocks.height;
   const std::int64_t most_rows = std::min(rows_at_once, 4 * kRowsAtOnce);
   const auto width = static_cast<std::size_t>(info.width);
   std::vector<double> strip;
@@ -120,7 +120,7 @@ PostSpacing post_spacing(const RasterInfo& info) {
                   "-outsize, or "
                   "make tiles of it with qmpipe build");
   }
-  if (info.is_geographic) return spacing_on_ellipsoid(info);
+  if (info.crs.is_geographic) return spacing_on_ellipsoid(info);
   return {.x_m = std::abs(plane.x_per_column) * plane.unit,
           .y_m = std::abs(plane.y_per_row) * plane.unit};
 }

@@ -59,8 +59,8 @@ std::optional<TileKey> PixelCheck::tile_at(std::size_t source, std::int64_t colu
                                            std::int64_t row) {
   const RasterInfo& info = pool_.info(source);
   const std::optional<LonLat> at =
-      pool_.grid(source).globe_at({.column = static_cast<double>(column + info.whole_column) + 0.5,
-                                   .row = static_cast<double>(row + info.whole_row) + 0.5});
+      pool_.grid(source).globe_at({.column = static_cast<double>(column + info.part.column) + 0.5,
+                                   .row = static_cast<double>(row + info.part.row) + 0.5});
   const double limit_deg = scheme_.rectangle_deg({.zoom = 0, .x = 0, .y = 0}).north_deg;
   if (!at || !(std::abs(at->latitude_deg) < limit_deg)) return std::nullopt;
   if (!is_among_valid(source, column, row)) return std::nullopt;

@@ -141,7 +141,7 @@ class DetailSimplifier {
   }
 
   // Whether the origin of e may go to its target.
-  bool is_sound(Index e) const {
+  bool is_sound(Index e) {
     if (!mesh_.may_collapse(e)) return false;
     const DetailPoint& end = points_[at(mesh_.target(e))];
     bool is_flat = true;

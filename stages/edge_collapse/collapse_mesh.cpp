@@ -49,7 +49,7 @@ void CollapseMesh::link(Index e, Index f) {
   if (f != kNone) half_edges_[at(f)].twin = e;
 }
 
-bool CollapseMesh::may_collapse(Index e) const {
+bool CollapseMesh::may_collapse(Index e) {
   const Index a = origin(e);
   const Index b = target(e);
   if (!on_hull(e) && vertex_on_hull(a) && vertex_on_hull(b)) return false;

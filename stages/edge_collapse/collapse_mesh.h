@@ -78,7 +78,7 @@ class CollapseMesh {
 
   // Whether the surface stays what it is when the edge becomes a vertex: its ends have no neighbours in common but
   // those across its triangles, and when both lie on the hull, so does it.
-  bool may_collapse(Index e) const;
+  bool may_collapse(Index e);
   // Merges the ends of e into one, which takes the number `kept`; the other vertex and the edge's
   // triangles die. REQUIRES: may_collapse(e); kept is one of its ends.
   void collapse(Index e, Index kept);
@@ -101,8 +101,8 @@ class CollapseMesh {
   std::vector<Index> out_;  // a half-edge that leaves each vertex: on the hull the one along it
   std::int64_t edge_count_ = 0;
   std::int64_t triangle_count_ = 0;
-  mutable std::vector<std::uint32_t> mark_;  // of vertices; scratch of may_collapse()
-  mutable std::uint32_t marks_ = 0;
+  std::vector<std::uint32_t> mark_;  // of vertices; scratch of may_collapse()
+  std::uint32_t marks_ = 0;
 };
 
 }  // namespace qmpipe

@@ -215,7 +215,7 @@ std::vector<CollapseSurface::Candidate> CollapseSurface::others(Index e) const {
   return others;
 }
 
-bool CollapseSurface::fits(Index e, const Candidate& candidate) const {
+bool CollapseSurface::fits(Index e, const Candidate& candidate) {
   if (!mesh_.may_collapse(e)) return false;
   const IntPoint place = {candidate.vertex.u, candidate.vertex.v};
   return each_new_triangle(e, candidate.kept, [&](Index x, Index y) {

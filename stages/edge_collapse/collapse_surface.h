@@ -50,7 +50,7 @@ class CollapseSurface {
   // no choice.
   std::vector<Candidate> others(Index e) const;
   // Whether the mesh stays a disk of counter-clockwise triangles.
-  bool fits(Index e, const Candidate& candidate) const;
+  bool fits(Index e, const Candidate& candidate);
   // REQUIRES: fits(e, candidate). Returns the vertex.
   Index collapse(Index e, const Candidate& candidate);
 

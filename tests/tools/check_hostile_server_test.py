@@ -223,6 +223,7 @@ class HostileServer(unittest.TestCase):
             context.load_cert_chain(certificate, key)
 
             def greet(connection, _):
+                connection.settimeout(30)  # a handshake takes long on a busy machine
                 with contextlib.suppress(ssl.SSLError):
                     context.wrap_socket(connection, server_side=True).close()
 

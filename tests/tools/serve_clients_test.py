@@ -25,6 +25,8 @@ HEAD = b"GET /tiles/0/0/0.terrain HTTP/1.1\r\nHost: x\r\n"
 # What the server gives a client for its head, and has for its own end.
 HEAD_TIME_S = 5
 END_S = 2
+# Until a process is seen to have ended, on a busy machine.
+SEEN_S = 0.5
 
 
 def peak_memory_kb(process):
@@ -262,7 +264,7 @@ class ServeClientsTest(unittest.TestCase):
             for trickle in trickles:
                 trickle.join()
             self.assertEqual((code, errors), (0, ""), how)
-            self.assertLess(took, END_S, how)
+            self.assertLess(took, END_S + SEEN_S, how)
 
     def test_a_signal_just_after_the_start_is_not_lost(self):
         for how in (signal.SIGTERM, signal.SIGINT):
@@ -271,7 +273,7 @@ class ServeClientsTest(unittest.TestCase):
                 time.sleep(delay)
                 start = time.monotonic()
                 self.assertEqual(server.end(how), (0, ""), (how, delay))
-                self.assertLess(time.monotonic() - start, END_S, (how, delay))
+                self.assertLess(time.monotonic() - start, END_S + SEEN_S, (how, delay))
 
 
 if __name__ == "__main__":

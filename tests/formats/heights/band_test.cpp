@@ -126,7 +126,7 @@ TEST(Pictures, AreDecodedToTheStepOfTheirEncodingInEveryLayout) {
       OpenOptions cached = plain;
       cached.cache = std::make_shared<SourceBlockCache>(1 << 20);
       const auto source = RasterSource::open(path, plain);
-      EXPECT_EQ(source->info().type_name, "Float32");
+      EXPECT_EQ(source->info().band.type_name, "Float32");
       const std::vector<double> read = read_all(*source);
       const std::vector<double> again = read_all(*RasterSource::open(path, cached));
       const double step = encoding == HeightEncoding::kTerrainRgb ? 0.051 : 0.002;

@@ -74,7 +74,7 @@ TEST(HeightRule, DepthsBecomeHeightsWhateverSaysThatTheyAreDepths) {
     fixture.band_metadata = one.metadata;
     fixture.value = [](int c, int) { return 100.0 * c - 50; };
     const auto source = open_fixture(file_in(folder, "a.tif"), fixture);
-    const double metres = source->info().metres_per_unit * (one.is_down ? -1 : 1);
+    const double metres = source->info().band.metres_per_unit * (one.is_down ? -1 : 1);
     EXPECT_THAT(read_all(*source), ::testing::ElementsAre(-50 * metres, 50 * metres, 150 * metres));
     if (one.is_down) {
       EXPECT_THAT(source->info().assumptions, Contains(HasSubstr("--z-scale -1")));
@@ -82,7 +82,7 @@ TEST(HeightRule, DepthsBecomeHeightsWhateverSaysThatTheyAreDepths) {
       HeightOptions turned;
       turned.z_scale = -1;
       const auto again = RasterSource::open(file_in(folder, "a.tif"), {.heights = turned});
-      EXPECT_DOUBLE_EQ(read_all(*again)[2], 150 * source->info().metres_per_unit);
+      EXPECT_DOUBLE_EQ(read_all(*again)[2], 150 * source->info().band.metres_per_unit);
     } else {
       EXPECT_THAT(source->info().assumptions, Not(Contains(HasSubstr("depths"))));
     }
@@ -95,7 +95,7 @@ TEST(HeightRule, ACrsThatTheUserGivesDecidesTheDirectionToo) {
   const auto depths =
       RasterSource::open(file_in(folder, "a.tif"), {.crs_override = "EPSG:4326+5715"});
   EXPECT_EQ(read_all(*depths)[1], -1);
-  EXPECT_EQ(depths->info().vertical_name, "MSL depth");
+  EXPECT_EQ(depths->info().band.vertical_name, "MSL depth");
 }
 
 TEST(HeightRule, ABagIsPositiveUpWhateverItsCrsSays) {
@@ -133,8 +133,8 @@ TEST(HeightRule, WhatHeightsAreAboveIsNamed) {
     write_raster(file_in(folder, "a.tif"), {.crs = ""});
     const auto source = RasterSource::open(file_in(folder, "a.tif"),
                                            {.crs_override = one.crs, .placing = Placing::kPlane});
-    EXPECT_EQ(source->info().height_reference, one.reference);
-    EXPECT_EQ(source->info().vertical_name, one.name);
+    EXPECT_EQ(source->info().band.reference, one.reference);
+    EXPECT_EQ(source->info().band.vertical_name, one.name);
   }
 }
 

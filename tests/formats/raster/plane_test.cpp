@@ -47,7 +47,7 @@ TEST(SourceCrs, OfHeightsAloneOrOfTheEarthsCentreIsRefused) {
   const auto source =
       RasterSource::open(file_in(folder, "a.tif"), {.crs_override = "EPSG:4326+5773"});
   EXPECT_EQ(source->pixel_at(12, 49)->column, 2);
-  EXPECT_EQ(source->info().vertical_name, "EGM96 height");
+  EXPECT_EQ(source->info().band.vertical_name, "EGM96 height");
 }
 
 TEST(SourceCrs, DegreesThatThereAreNotAreRefused) {

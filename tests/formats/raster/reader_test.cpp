@@ -103,8 +103,8 @@ void compare(const std::string& path, std::uint64_t seed, std::int64_t bound_byt
                              << window.width << " x " << window.height;
   }
   ASSERT_TRUE(agree(read_all(*plain), read_all(*cached)));
-  const std::int64_t across = (info.width + info.block_width - 1) / info.block_width;
-  const std::int64_t down = (info.height + info.block_height - 1) / info.block_height;
+  const std::int64_t across = (info.width + info.blocks.width - 1) / info.blocks.width;
+  const std::int64_t down = (info.height + info.blocks.height - 1) / info.blocks.height;
   EXPECT_EQ(cache->reads().blocks, across * down);
   EXPECT_GE(cache->reads().decoded_blocks, cache->reads().blocks);
   if (bound_bytes > (64 << 20)) {
@@ -156,16 +156,16 @@ TEST(RasterReader, SmallBlocksAreCachedSeveralAtATime) {
     return RasterSource::open(path)->info();
   };
   const RasterInfo rows = info_of(layouts()[1]);
-  EXPECT_EQ(rows.block_height, 1);
-  EXPECT_EQ(rows.cached_width, 307);
-  EXPECT_GT(rows.cached_height, 100);
+  EXPECT_EQ(rows.blocks.height, 1);
+  EXPECT_EQ(rows.blocks.cached_width, 307);
+  EXPECT_GT(rows.blocks.cached_height, 100);
   const RasterInfo tiles = info_of(layouts()[4]);
-  EXPECT_EQ(tiles.cached_width, 128);
-  EXPECT_EQ(tiles.cached_block_bytes, 128 * 128 * 2);
+  EXPECT_EQ(tiles.blocks.cached_width, 128);
+  EXPECT_EQ(tiles.blocks.cached_bytes, 128 * 128 * 2);
   const RasterInfo small = info_of(layouts()[5]);
-  EXPECT_EQ(small.cached_width % small.block_width, 0);
-  EXPECT_EQ(small.cached_height % small.block_height, 0);
-  EXPECT_GE(small.cached_width * small.cached_height, 16'384);
+  EXPECT_EQ(small.blocks.cached_width % small.blocks.width, 0);
+  EXPECT_EQ(small.blocks.cached_height % small.blocks.height, 0);
+  EXPECT_GE(small.blocks.cached_width * small.blocks.cached_height, 16'384);
 }
 
 TEST(RasterReader, HandlesOnOneFileShareBlocksAndFilesDoNot) {

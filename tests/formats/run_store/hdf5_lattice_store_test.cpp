@@ -28,7 +28,6 @@ using testing::block_of_seed;
 using testing::BlockModel;
 using ::testing::HasSubstr;
 using testing::output_of;
-using testing::posts_of;
 using testing::SmallDisk;
 using testing::TemporaryFolder;
 

@@ -18,7 +18,6 @@ namespace {
 
 using testing::block_of_seed;
 using testing::BlockModel;
-using testing::posts_of;
 using testing::same_height;
 using testing::TemporaryFolder;
 

@@ -221,15 +221,15 @@ TEST_F(JoinedGrids, TheWholeGridIsTheUncutRasters) {
   RasterFixture whole = rough_raster(dice_, 60, 40);
   whole.geotransform = {{178.7, 0.1, 0, -12, 0, -0.1}};
   const RasterInfo uncut = joined({write(whole)}).front();
-  EXPECT_EQ(uncut.whole, nullptr);
+  EXPECT_EQ(uncut.part.whole, nullptr);
   std::vector<std::string> files = cut_files(whole, 7, true);
   for (int turn = 0; turn < 5; ++turn) {
     for (const RasterInfo& info : joined(files)) {
-      ASSERT_NE(info.whole, nullptr);
-      EXPECT_EQ(info.whole->plane, uncut.plane);
-      EXPECT_EQ(info.whole->width, uncut.width);
-      EXPECT_EQ(info.whole->height, uncut.height);
-      EXPECT_EQ(info.whole->bounds_deg, uncut.bounds_deg);
+      ASSERT_NE(info.part.whole, nullptr);
+      EXPECT_EQ(info.part.whole->plane, uncut.plane);
+      EXPECT_EQ(info.part.whole->width, uncut.width);
+      EXPECT_EQ(info.part.whole->height, uncut.height);
+      EXPECT_EQ(info.part.whole->bounds_deg, uncut.bounds_deg);
       EXPECT_EQ(info.pixel_deg, uncut.pixel_deg);
     }
     std::shuffle(files.begin(), files.end(), dice_);
@@ -249,8 +249,8 @@ class TwoRasters : public JoinedGrids {
     return joined({write(fixture), first});
   }
   bool are_joined(const std::vector<RasterInfo>& infos) {
-    EXPECT_EQ(infos[0].whole, infos[1].whole);
-    return infos[0].whole != nullptr;
+    EXPECT_EQ(infos[0].part.whole, infos[1].part.whole);
+    return infos[0].part.whole != nullptr;
   }
 };
 
@@ -276,12 +276,12 @@ TEST_F(TwoRasters, AreJoinedWhereTheyTouchOnOneGrid) {
 TEST_F(TwoRasters, WhereTheyAreBesideEachOtherOnTheWholeGridIsTold) {
   const std::vector<RasterInfo> infos = beside(5, -3);
   ASSERT_TRUE(are_joined(infos));
-  EXPECT_EQ(infos[0].whole_column, 5);
-  EXPECT_EQ(infos[0].whole_row, 0);
-  EXPECT_EQ(infos[1].whole_column, 0);
-  EXPECT_EQ(infos[1].whole_row, 3);
-  EXPECT_EQ(infos[0].whole->width, 13);
-  EXPECT_EQ(infos[0].whole->height, 11);
+  EXPECT_EQ(infos[0].part.column, 5);
+  EXPECT_EQ(infos[0].part.row, 0);
+  EXPECT_EQ(infos[1].part.column, 0);
+  EXPECT_EQ(infos[1].part.row, 3);
+  EXPECT_EQ(infos[0].part.whole->width, 13);
+  EXPECT_EQ(infos[0].part.whole->height, 11);
 }
 
 // Where inputs overlap, the first that is valid wins, on one grid and with another between.

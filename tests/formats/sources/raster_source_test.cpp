@@ -49,7 +49,7 @@ TEST(RasterSource, ReadsHeightsRowByRowFromTheTop) {
   source->read({.column0 = 2, .row0 = 1, .width = 2, .height = 1}, window);
   EXPECT_THAT(window, ::testing::ElementsAre(12, 13));
   EXPECT_EQ(source->info().driver, "GTiff");
-  EXPECT_EQ(source->info().unit, "m");
+  EXPECT_EQ(source->info().band.unit, "m");
   EXPECT_THAT(source->info().assumptions, IsEmpty());
 }
 
@@ -116,7 +116,7 @@ TEST(RasterSource, ScaleOffsetAndUnitApplyAfterTheVoidValue) {
   EXPECT_DOUBLE_EQ(heights[0], 60 * 0.3048);
   EXPECT_TRUE(std::isnan(heights[1]));
   EXPECT_DOUBLE_EQ(heights[2], 10 * 0.3048);
-  EXPECT_EQ(source->info().metres_per_unit, 0.3048);
+  EXPECT_EQ(source->info().band.metres_per_unit, 0.3048);
 }
 
 TEST(RasterSource, UnknownUnitIsTakenAsMetresAndSaid) {
@@ -124,7 +124,7 @@ TEST(RasterSource, UnknownUnitIsTakenAsMetresAndSaid) {
   RasterFixture fixture;
   fixture.unit = "smoot";
   const auto source = open_fixture(file_in(folder, "a.tif"), fixture);
-  EXPECT_EQ(source->info().metres_per_unit, 1);
+  EXPECT_EQ(source->info().band.metres_per_unit, 1);
   EXPECT_THAT(source->info().assumptions, ::testing::Contains(HasSubstr("smoot")));
 }
 
@@ -347,12 +347,12 @@ TEST(RasterSource, VerticalPartOfTheCrsIsNotInTheWay) {
   RasterFixture fixture;
   fixture.crs = "EPSG:4326+5773";
   const auto source = open_fixture(file_in(folder, "a.tif"), fixture);
-  EXPECT_EQ(source->info().height_reference, HeightReference::kDatum);
-  EXPECT_TRUE(source->info().is_geographic);
+  EXPECT_EQ(source->info().band.reference, HeightReference::kDatum);
+  EXPECT_TRUE(source->info().crs.is_geographic);
   EXPECT_EQ(source->pixel_at(12, 49)->column, 2);
   fixture.crs = "EPSG:4979";
   const auto with_height = open_fixture(file_in(folder, "b.tif"), fixture);
-  EXPECT_EQ(with_height->info().height_reference, HeightReference::kEllipsoid);
+  EXPECT_EQ(with_height->info().band.reference, HeightReference::kEllipsoid);
   EXPECT_TRUE(with_height->info().is_separable);
 }
 

@@ -15,8 +15,8 @@ RasterInfo source_of_a_quarter() {
   RasterInfo source;
   source.bounds_deg = {.west_deg = -36, .south_deg = 15, .east_deg = 43, .north_deg = 90};
   source.pixel_deg = 0.01;
-  source.block_width = 256;
-  source.block_height = 256;
+  source.blocks.width = 256;
+  source.blocks.height = 256;
   return source;
 }
 
@@ -41,13 +41,13 @@ TEST(MemoryShare, TheLatticeGivesWayToTheStripsOfAWideSource) {
   source.height = 2400;
   source.bounds_deg = {.west_deg = 0, .south_deg = 10, .east_deg = 80, .north_deg = 13.3333};
   source.pixel_deg = 80.0 / 57600;
-  source.cached_width = source.width;
-  source.cached_height = 1;
-  source.cached_block_bytes = source.width * 2;
+  source.blocks.cached_width = source.width;
+  source.blocks.cached_height = 1;
+  source.blocks.cached_bytes = source.width * 2;
   const SurveyChoice choice{.threads = 2};
   const MemoryShare share = MemoryDivisions({.limit_bytes = 320LL << 20U}, choice, {source}).best();
   EXPECT_LT(share.last_memory_zoom, chosen_sampling_zoom(choice, {source}));
-  EXPECT_GE(share.plan.source_cache_bytes, 260 * source.cached_block_bytes);
+  EXPECT_GE(share.plan.source_cache_bytes, 260 * source.blocks.cached_bytes);
   EXPECT_LE(share.plan.expected_peak_bytes, 320LL << 20U);
 }
 

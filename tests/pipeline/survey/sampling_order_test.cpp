@@ -20,9 +20,9 @@ RasterInfo large_grid(std::int64_t block_width, std::int64_t block_height) {
   info.height = 108132;
   info.bounds_deg = {.west_deg = -36, .south_deg = 15, .east_deg = 43, .north_deg = 90};
   info.pixel_deg = 75.0 / 108132;
-  info.cached_width = block_width;
-  info.cached_height = block_height;
-  info.cached_block_bytes = block_width * block_height * 2;
+  info.blocks.cached_width = block_width;
+  info.blocks.cached_height = block_height;
+  info.blocks.cached_bytes = block_width * block_height * 2;
   return info;
 }
 
@@ -34,14 +34,14 @@ TEST(SamplingOrder, AFrontOfStripsIsTwiceTheRowsOfABlock) {
   const Lattice lattice = lattice_for(10);
   const RasterInfo strips = large_grid(113892, 1);
   const std::int64_t bytes = front_bytes(lattice, {strips}, 2, whole(lattice));
-  EXPECT_GT(bytes, 2 * 253 * strips.cached_block_bytes);
-  EXPECT_LT(bytes, 2 * 262 * strips.cached_block_bytes);
+  EXPECT_GT(bytes, 2 * 253 * strips.blocks.cached_bytes);
+  EXPECT_LT(bytes, 2 * 262 * strips.blocks.cached_bytes);
 }
 
 TEST(SamplingOrder, NoFrontIsLargerThanTheSource) {
   const Lattice lattice = lattice_for(10);
   const RasterInfo one_block = large_grid(113892, 108132);
-  EXPECT_EQ(front_bytes(lattice, {one_block}, 80, whole(lattice)), one_block.cached_block_bytes);
+  EXPECT_EQ(front_bytes(lattice, {one_block}, 80, whole(lattice)), one_block.blocks.cached_bytes);
 }
 
 TEST(SamplingOrder, SourcesSideBySideInARowAddUp) {

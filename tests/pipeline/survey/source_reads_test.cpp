@@ -100,11 +100,11 @@ class SourceReadsTest : public ::testing::Test {
 TEST_F(SourceReadsTest, EveryBlockIsDecodedAboutOnceOnAnyNumberOfThreads) {
   for (const std::string& path : files()) {
     const RasterInfo info = RasterSource::open(path)->info();
-    const std::int64_t blocks = ((info.width + info.block_width - 1) / info.block_width) *
-                                ((info.height + info.block_height - 1) / info.block_height);
+    const std::int64_t blocks = ((info.width + info.blocks.width - 1) / info.blocks.width) *
+                                ((info.height + info.blocks.height - 1) / info.blocks.height);
     std::vector<float> sampled;
     for (const std::int32_t threads : {1, 2, 8}) {
-      SCOPED_TRACE(std::to_string(info.block_width) + " x " + std::to_string(info.block_height) +
+      SCOPED_TRACE(std::to_string(info.blocks.width) + " x " + std::to_string(info.blocks.height) +
                    " on " + std::to_string(threads) + " threads");
       // How far threads stand apart is the system's to say: they get what a build gives them.
       const std::int64_t cache_bytes = threads == 1 ? comfortable_bytes(path, 1) : 64LL << 20U;
@@ -120,7 +120,7 @@ TEST_F(SourceReadsTest, EveryBlockIsDecodedAboutOnceOnAnyNumberOfThreads) {
 TEST_F(SourceReadsTest, WithHardlyAnyCacheItEndsAndSaysHowOften) {
   for (const std::string& path : files()) {
     const RasterInfo info = RasterSource::open(path)->info();
-    SCOPED_TRACE(std::to_string(info.block_width) + " x " + std::to_string(info.block_height));
+    SCOPED_TRACE(std::to_string(info.blocks.width) + " x " + std::to_string(info.blocks.height));
     const Survey roomy = survey_of(path, 2, 1LL << 30U);
     const Survey tight = survey_of(path, 2, 1);
     EXPECT_EQ(tight.source_reads.blocks, roomy.source_reads.blocks);

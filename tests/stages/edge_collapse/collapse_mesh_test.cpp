@@ -111,7 +111,7 @@ TEST(CollapseMesh, StaysADiskWhateverIsCollapsedDownToOneTriangle) {
 
 TEST(CollapseMesh, RefusesWhatWouldNotBeADisk) {
   // Two triangles that share the edge 0-2: its ends both lie on the hull.
-  const CollapseMesh square = mesh_of({0, 1, 2, 0, 2, 3});
+  CollapseMesh square = mesh_of({0, 1, 2, 0, 2, 3});
   EXPECT_FALSE(square.may_collapse(2));
   EXPECT_FALSE(square.may_collapse(3));
   EXPECT_TRUE(square.may_collapse(0));
@@ -119,7 +119,7 @@ TEST(CollapseMesh, RefusesWhatWouldNotBeADisk) {
   EXPECT_FALSE(mesh_of({0, 1, 2}).may_collapse(0));
   // A triangle in a triangle: 0 and 1 have both 2 and 3 in common, which is one too many on the hull;
   // 3 is inside and may go anywhere.
-  const CollapseMesh inside = mesh_of({0, 1, 3, 1, 2, 3, 2, 0, 3});
+  CollapseMesh inside = mesh_of({0, 1, 3, 1, 2, 3, 2, 0, 3});
   EXPECT_FALSE(inside.may_collapse(0));
   EXPECT_TRUE(inside.may_collapse(1));
 }

@@ -141,7 +141,7 @@ TEST(RasterWriter, WhatIsWrittenIsRead) {
   write_blocks(*writer, options);
   writer->close();
   const auto source = RasterSource::open(path);
-  EXPECT_EQ(source->info().block_width, 256);
+  EXPECT_EQ(source->info().blocks.width, 256);
   EXPECT_EQ(source->info().bounds_deg, options.bounds_deg);
   const std::vector<double> heights = read_all(*source);
   EXPECT_EQ(heights[0], 0);
