@@ -137,7 +137,7 @@ tidy() {
   local status=0
   export analyzer_nodes
   export -f tidy_file compile_file
-  cmake --preset dev -B build/alone -DQMPIPE_UNITY=OFF -DCMAKE_CXX_COMPILER_LAUNCHER= >build/alone-configure.log 2>&1 ||
+  cmake --preset dev -B build/alone -DQMPIPE_UNITY=OFF >build/alone-configure.log 2>&1 ||
     { cat build/alone-configure.log; return 1; }
   python3 - <<'PYTHON' >build/tidy-files.log || return 1
 import json, os, re, subprocess, zlib
