@@ -24,7 +24,7 @@ std::unique_ptr<const LatticeInputs> make_inputs(DemKind kind) {
   set_gdal_cache_bytes(kWideCacheBytes);
   auto inputs = std::make_unique<LatticeInputs>();
   inputs->dem = std::make_unique<BenchDem>(kind, columns, rows);
-  inputs->narrow_cache_bytes = columns * static_cast<std::int64_t>(kBlockSize * sizeof(float)) / 2;
+  inputs->narrow_cache_bytes = columns * kBlockBytes / 2;
   const auto sampler = open_sampler(inputs->dem->path(), Resampling::kBilinear);
   for (const TileKey& tile : inputs->dem->tiles()) {
     inputs->blocks.emplace_back(kBlockSize);

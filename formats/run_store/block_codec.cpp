@@ -7,7 +7,7 @@
 #include <mutex>
 #include <new>
 
-#include "formats/run_store/lattice_window.h"
+#include "scheduler/block_key.h"
 #include "scheduler/check.h"
 
 namespace qmpipe {

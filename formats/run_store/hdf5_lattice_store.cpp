@@ -28,7 +28,6 @@ namespace fs = std::filesystem;
 constexpr std::size_t kFullSegmentBlocks = 1024;
 // A node of a hash map and its bucket.
 constexpr std::int64_t kIndexEntryBytes = 112;
-constexpr auto kBlockBytes = static_cast<std::int64_t>(kBlockSize * sizeof(float));
 
 class Hdf5LatticeStore final : public LatticeStore {
  public:

@@ -15,6 +15,9 @@
 
 namespace qmpipe {
 
+// What the heights of one block take, uncompressed.
+inline constexpr auto kBlockBytes = static_cast<std::int64_t>(kBlockSize * sizeof(float));
+
 class LatticeStore {
  public:
   virtual ~LatticeStore() = default;

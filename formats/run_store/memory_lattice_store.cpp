@@ -1,3 +1,4 @@
+#include <iterator>
 #include <mutex>
 #include <shared_mutex>
 #include <unordered_map>
@@ -38,7 +39,7 @@ class MemoryLatticeStore final : public LatticeStore {
 
   std::int64_t memory_bytes() const override {
     const std::shared_lock lock(mutex_);
-    return static_cast<std::int64_t>(blocks_.size() * kBlockSize * sizeof(float));
+    return std::ssize(blocks_) * kBlockBytes;
   }
 
  private:

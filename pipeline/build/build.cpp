@@ -55,12 +55,12 @@ void note_sampling(const SurveyChoice& survey, const std::vector<RasterInfo>& so
                    Progress& progress) {
   const std::int32_t zoom = chosen_sampling_zoom(survey, sources);
   if (survey.max_zoom < 0 || survey.max_zoom >= zoom) return;
-  const std::int64_t posts =
-      expected_blocks(survey.scheme, zoom, sources) * (std::int64_t{kBlockPosts} * kBlockPosts);
+  const std::int64_t blocks = expected_blocks(survey.scheme, zoom, sources);
   progress.note(fmt::format(
       "tiles end at zoom {}, but posts are taken at zoom {}, where they are no wider apart than "
       "the pixels, and reduced: at most {} posts, {} while the run lasts",
-      survey.max_zoom, zoom, posts, bytes_text(posts * static_cast<std::int64_t>(sizeof(float)))));
+      survey.max_zoom, zoom, blocks * static_cast<std::int64_t>(kBlockSize),
+      bytes_text(blocks * kBlockBytes)));
 }
 
 void note_grids(const std::vector<RasterInfo>& sources, Progress& progress) {
@@ -332,8 +332,8 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   require_sound(options);
   const tbb::global_control workers(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(options.run.threads));
-  const SurveyChoice choice = survey_choice(options);
-  const std::vector<RasterInfo> sources = describe_inputs(choice);
+  SurveyChoice choice = survey_choice(options);
+  std::vector<RasterInfo> sources = describe_inputs(choice);
   if (auto set = found_set(options)) {
     BuildResult result;
     result.found = std::move(set);
@@ -345,10 +345,10 @@ BuildResult build_pyramid(const BuildOptions& options, Progress& progress) {
   note_sampling(choice, sources, progress);
   progress.expect(phases_of_build(options, choice, sources));
   // Refuses what cannot work before anything is made on disk.
-  const Groundwork ground = {
-      .choice = choice,
-      .sources = sources,
-      .divisions = MemoryDivisions(memory_request(options), choice, sources)};
+  MemoryDivisions divisions(memory_request(options), choice, sources);
+  const Groundwork ground = {.choice = std::move(choice),
+                             .sources = std::move(sources),
+                             .divisions = std::move(divisions)};
   const std::vector<std::filesystem::path> made = missing_folders(options.output.path);
   RunPlace place = open_place(options, progress);
   try {

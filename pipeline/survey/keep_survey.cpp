@@ -9,7 +9,6 @@
 
 #include "formats/bytes/errors.h"
 #include "formats/run_store/hdf5_lattice_store.h"
-#include "formats/run_store/lattice_window.h"
 #include "pipeline/common/stopwatch.h"
 #include "pipeline/survey/block_cover.h"
 

@@ -17,8 +17,6 @@
 namespace qmpipe {
 namespace {
 
-constexpr auto kBlockBytes = static_cast<std::int64_t>(kBlockSize * sizeof(float));
-
 MemoryNeeds needs_of(const SurveyChoice& survey, const std::vector<RasterInfo>& sources,
                      std::int64_t limit_bytes) {
   MemoryNeeds needs{.threads = survey.threads};

@@ -13,7 +13,6 @@
 #include "formats/bytes/errors.h"
 #include "formats/raster/block_cache.h"
 #include "formats/run_store/hdf5_lattice_store.h"
-#include "formats/run_store/lattice_window.h"
 #include "formats/run_store/tiered_lattice_store.h"
 #include "formats/sources/source_pool.h"
 #include "pipeline/common/stopwatch.h"

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <utility>
 
-#include "formats/run_store/lattice_window.h"
 #include "formats/sources/raster_source.h"
 #include "pipeline/build/build_plan.h"
 #include "pipeline/build/estimate.h"
